@@ -185,6 +185,8 @@ class SimulatedSystem:
             self._messages[name].append(value)
             if self._deadlines is not None:
                 self._deadlines.on_message(node, name)
+        elif kind == 'callback' and self._threads.current is not None:
+            self._threads.current.looks = 0
         if node == f'/{DRIVER}':
             node = ''
         self._on_event(Event(self._threads.now_ns, kind, node, name, value))

@@ -10,9 +10,10 @@ import _thread
 import select
 import threading
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from composer.virtual_time.clocks import to_ns
+from composer.virtual_time.clocks import is_duration, to_ns
 from composer.virtual_time.originals import LOCK_TYPE, REAL
 from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 _NO_TIMEOUT: Final = -1
+# The arguments of `select.select` before the time-out.
+_FILES: Final = 3
 
 
 def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..., Any]]]:
@@ -29,13 +32,10 @@ def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..
     sleep = ReplacedFunction(time.sleep)
 
     def sleep_virtually(seconds: Any) -> None:
-        if threads.mine() is None:
+        if threads.mine() is None or not is_duration(seconds):
             sleep.original(seconds)
-            return
-        if seconds < 0:
-            message = 'sleep length must be non-negative'
-            raise ValueError(message)
-        threads.sleep(to_ns(seconds))
+        else:
+            threads.sleep(to_ns(seconds))
 
     yield sleep, sleep_virtually
     yield from _locks(threads)
@@ -45,11 +45,13 @@ def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..
     start = ReplacedFunction(_thread.start_new_thread)
 
     def start_new_thread(function: Any, arguments: Any, *keywords: Any) -> Any:
-        owner = getattr(function, '__self__', None)
-        if threads.mine() is None or keywords or isinstance(owner, threading.Thread):
+        is_called_by_python = isinstance(getattr(function, '__self__', None), threading.Thread)
+        is_valid = callable(function) and all(map(isinstance, (arguments, *keywords), (tuple, dict)))
+        if threads.mine() is None or is_called_by_python or not is_valid:
             return start.original(function, arguments, *keywords)
+        call = partial(function, *arguments, **(keywords[0] if keywords else {}))
         run: Callable[..., Any] = threads.run
-        return start.original(run, (threads.add(), function, *arguments))
+        return start.original(run, (threads.add(), call))
 
     yield start, start_new_thread
 
@@ -76,7 +78,7 @@ def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable
     real_acquire = REAL.acquire
 
     def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002 - as C has it
-        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0):
+        if blocking and (timeout == _NO_TIMEOUT or is_duration(timeout)):
             if real_acquire(self, False):
                 return True
             if threads.mine() is None:
@@ -100,7 +102,7 @@ def _reentrant_locks(
     real_acquire = target.original
 
     def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002
-        if blocking and (timeout == _NO_TIMEOUT or timeout >= 0):
+        if blocking and (timeout == _NO_TIMEOUT or is_duration(timeout)):
             if real_acquire(self, False):
                 return True
             if threads.mine() is None:
@@ -130,7 +132,8 @@ def _queues(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callabl
     real_get = target.original
 
     def get(self: Any, block: Any = True, timeout: Any = None) -> Any:  # noqa: FBT002
-        if not block or threads.mine() is None or (timeout is not None and timeout < 0):
+        is_wait = block and (timeout is None or is_duration(timeout))
+        if not is_wait or threads.mine() is None:
             return real_get(self, block, timeout)
 
         def take() -> Any:
@@ -162,9 +165,11 @@ def _polling(
         def look() -> Any:
             return real_poll(self, 0, *arguments, **keywords)
 
-        if threads.mine() is None or timeout == 0:
+        is_endless = timeout is None or (isinstance(timeout, int | float) and timeout < 0)
+        is_wait = timeout != 0 and (is_endless or is_duration(timeout))
+        if not is_wait or threads.mine() is None:
             return real_poll(self, timeout, *arguments, **keywords)
-        limit = None if timeout is None or timeout < 0 else timeout * unit_sec
+        limit = None if is_endless else timeout * unit_sec
         return look() or _wait_for_turns(threads, look, look, limit)
 
     return target, poll
@@ -175,12 +180,13 @@ def virtual_select(threads: SimulatedThreads) -> Callable[..., Any]:
     real_select: Callable[..., Any] = select.select
 
     def select_virtually(*arguments: Any) -> Any:
-        timeout = arguments[3] if len(arguments) > 3 else None  # noqa: PLR2004
-        if threads.mine() is None or timeout == 0:
+        timeout = arguments[3] if len(arguments) > _FILES else None
+        is_wait = timeout is None or (timeout != 0 and is_duration(timeout))
+        if threads.mine() is None or len(arguments) < _FILES or not is_wait:
             return real_select(*arguments)
 
         def look() -> Any:
-            found = real_select(*arguments[:3], 0)
+            found = real_select(*arguments[:_FILES], 0)
             return found if any(found) else None
 
         return look() or _wait_for_turns(threads, look, look, timeout) or ([], [], [])

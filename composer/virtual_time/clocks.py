@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import time
-from threading import get_ident
+from threading import TIMEOUT_MAX, get_ident
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
@@ -25,6 +25,12 @@ def to_ns(seconds: float) -> int:
     return whole * _SECOND_NS + -int(-(seconds - whole) * 1e9 // 1)
 
 
+def is_duration(seconds: Any) -> bool:
+    """Tell whether waits take it; what they do not take they refuse themselves."""
+    is_number = isinstance(seconds, float) or hasattr(seconds, '__index__')
+    return is_number and 0 <= seconds <= TIMEOUT_MAX
+
+
 def clocks(
     threads: SimulatedThreads, start_time_ns: int
 ) -> Iterator[tuple[Any, Callable[..., Any]]]:
@@ -41,12 +47,18 @@ def clocks(
         original = target.original
 
         def read_ns() -> Any:
-            return start_ns + threads.now_ns if get_ident() in by_ident else original()
+            thread = by_ident.get(get_ident())
+            if thread is None:
+                return original()
+            threads.count_look(thread)
+            return start_ns + threads.now_ns
 
         def read_sec() -> Any:
-            if get_ident() in by_ident:
-                return (start_ns + threads.now_ns) / divisor
-            return original()
+            thread = by_ident.get(get_ident())
+            if thread is None:
+                return original()
+            threads.count_look(thread)
+            return (start_ns + threads.now_ns) / divisor
 
         return target, read_ns if divisor == 1 else read_sec
 
@@ -81,8 +93,10 @@ def _clock_by_identifier(
 
     def read(*arguments: Any) -> Any:
         start = starts.get(arguments[0]) if len(arguments) == 1 else None
-        if start is None or threads.mine() is None:
+        thread = threads.mine()
+        if start is None or thread is None:
             return target.original(*arguments)
+        threads.count_look(thread)
         now_ns = start + threads.now_ns
         return now_ns if divisor == 1 else now_ns / divisor
 

@@ -39,6 +39,9 @@ def thread_methods(
         if simulated is None:
             bootstrap(self)
         else:
+            report = self._invoke_excepthook
+            # What comes of the end of the simulation is no error of the thread.
+            self._invoke_excepthook = lambda who: simulated.is_ending or report(who)
             threads.run(simulated, bootstrap, self)
 
     def join_in_turn(self: Any, timeout: Any = None) -> None:

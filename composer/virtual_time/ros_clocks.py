@@ -34,6 +34,9 @@ class SimulatedClock(ROSClock):
 
     def now(self) -> Time:
         """Return the virtual time."""
+        thread = self.threads.mine()
+        if thread is not None:
+            self.threads.count_look(thread)
         now_ns = self.start_ns + self.threads.now_ns
         return Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME)
 
@@ -79,8 +82,10 @@ def _replacements(
         return ROSClock() if threads.mine() is None else simulated
 
     def now_virtually(self: Any) -> Time:
-        if threads.mine() is None or self.clock_type is ClockType.ROS_TIME:
+        thread = threads.mine()
+        if thread is None or self.clock_type is ClockType.ROS_TIME:
             return now(self)
+        threads.count_look(thread)
         is_steady = self.clock_type is ClockType.STEADY_TIME
         start_ns = MONOTONIC_START_NS if is_steady else simulated.start_ns
         return Time(nanoseconds=start_ns + threads.now_ns, clock_type=self.clock_type)

@@ -11,6 +11,7 @@ import heapq
 import itertools
 from collections import deque
 from contextlib import contextmanager
+from operator import itemgetter
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
 _LOOK_SEC = 0.25
 _ON_TIME: Final = 0
 _LATE: Final = 1
-_FOREVER_SEC = 1e9
+_MOST_ROUNDS: Final = 1000
+# Who looks so often without a wait waits for the time: a look takes a microsecond then, and a
+# wait of no length 50, about as long as they do.
+_MOST_LOOKS: Final = 1000
+_LOOKS_NS: Final = 1_000_000
+_LOOKS_PER_WAIT: Final = 50
 
 # When, whether after all else at that time, a number that keeps the order, and what.
 _Due: TypeAlias = 'tuple[int, int, int, _Wait | _Call]'
@@ -58,18 +64,22 @@ class SimulatedThread:
     Attributes:
         turn: A real lock that is free when it is this thread's turn.
         ident: What `threading.get_ident` says in it; 0 before it has begun.
+        is_ending: Whether it has been told to end.
         is_over: Whether it has ended.
+        looks: How often it has read a clock, or not really waited, since it last did.
         on_wait: Called before it lets others run.
         error: What is raised where it waits.
     """
 
-    __slots__ = ('error', 'ident', 'is_over', 'on_wait', 'turn')
+    __slots__ = ('error', 'ident', 'is_ending', 'is_over', 'looks', 'on_wait', 'turn')
 
     def __init__(self) -> None:
         self.turn = REAL.allocate_lock()
         REAL.acquire(self.turn)
         self.ident = 0
+        self.is_ending = False
         self.is_over = False
+        self.looks = 0
         self.on_wait: Callable[[], None] | None = None
         self.error: BaseException | None = None
 
@@ -127,6 +137,7 @@ class SimulatedThreads:
         self._numbers = itertools.count()
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
+        self._is_picking = False
         self._preemption = Preemption(shuffle, self.pause) if shuffle is not None else None
 
     def mine(self) -> SimulatedThread | None:
@@ -223,11 +234,15 @@ class SimulatedThreads:
         if me is None:
             message = 'a thread that takes no turns waits for those that do'
             raise RuntimeError(message)
-        if self._is_closing and me is not self._visitor:
+        if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
             raise SystemExit
         if me.on_wait is not None:
             me.on_wait()
         wait = _Wait(me, attempt)
+        is_long = timeout_ns is None or timeout_ns > 0
+        me.looks = 0 if is_long else me.looks + _LOOKS_PER_WAIT
+        if me.looks > _MOST_LOOKS:
+            me.looks, timeout_ns = 0, _LOOKS_NS
         if timeout_ns is not None:
             until_ns = self.now_ns + max(timeout_ns, 0)
             entry = (until_ns, _LATE if is_late else _ON_TIME, next(self._numbers), wait)
@@ -242,6 +257,15 @@ class SimulatedThreads:
         """Let so much time pass."""
         self.wait_until(None, duration_ns)
 
+    def count_look(self, thread: SimulatedThread) -> None:
+        """Count that the calling thread reads a clock: time passes in loops that do nothing else.
+
+        That depends only on what the thread does, so that it is the same in each run.
+        """
+        thread.looks += 1
+        if thread.looks > _MOST_LOOKS and thread is self.current and not self._is_picking:
+            self.sleep(_LOOKS_NS)
+
     def pause(self) -> None:
         """Let others run first, if any can."""
         me = self.current
@@ -255,20 +279,39 @@ class SimulatedThreads:
     def close(self) -> None:
         """End all threads that wait, where they wait; for the thread that has entered."""
         self._is_closing = True
-        me = self.current
-        for wait in list(self._waits):
-            if wait.thread is not me:
+        self._end_all()
+        for _ in range(_MOST_ROUNDS):
+            self._look()
+            if not self._ready:
+                self._end_all()
+            if not self._ready:
+                break
+            self._let_others_end()
+
+    def _end_all(self) -> None:
+        """Have those who wait raise `SystemExit` in their turns."""
+        due, self._due = sorted(self._due, key=itemgetter(slice(3))), []
+        for wait in (*self._waits, *(entry[-1] for entry in due)):
+            if isinstance(wait, _Wait) and wait.thread is not self.current:
                 self._release(wait)
-        while self._due:
-            what = heapq.heappop(self._due)[-1]
-            if isinstance(what, _Wait) and what.thread is not me:
-                self._release(what)
         for thread in self._ready:
+            thread.is_ending = True
             thread.error = SystemExit()
-        if me is not None:
-            while self._ready:
-                self._ready.append(me)
-                self._switch(me)
+
+    def _let_others_end(self) -> None:
+        me = self.current
+        while me is not None and self._ready:
+            self._ready.append(me)
+            self._switch(me)
+
+    @staticmethod
+    def _must_end(me: SimulatedThread, timeout_ns: int | None) -> bool:
+        """Tell whether a thread ends instead of a wait, after the end of the simulation.
+
+        One that ends may wait for a lock, as those who have it end, too.
+        """
+        was_ending, me.is_ending = me.is_ending, True
+        return not was_ending or timeout_ns is not None
 
     def _release(self, wait: _Wait) -> None:
         if not wait.is_over:
@@ -305,6 +348,12 @@ class SimulatedThreads:
 
     def _pick(self) -> SimulatedThread:
         """Return the thread whose turn is next, at a later time if there is none now."""
+        self._is_picking = True
+        thread = self._find()
+        self._is_picking = False
+        return thread
+
+    def _find(self) -> SimulatedThread:
         ready = self._ready
         while True:
             try:

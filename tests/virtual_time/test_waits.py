@@ -1,0 +1,339 @@
+"""What Python programs wait with takes virtual time, and no more real time than it must."""
+
+import _thread
+import asyncio
+import os
+import queue
+import select
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import wait as wait_for_futures
+from time import sleep
+
+import pytest
+
+from tests.virtual_time.virtual_runs import virtual_time
+
+
+def _after(seconds, function, *arguments):
+    def run():
+        sleep(seconds)
+        function(*arguments)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+
+def _sleep():
+    sleep(3)
+
+
+def _sleep_by_default_argument(pause=time.sleep):
+    pause(3)
+
+
+def _lock():
+    lock = threading.Lock()
+    lock.acquire()
+    _after(3, lock.release)
+    with lock:
+        assert lock.locked()
+
+
+def _lock_in_vain():
+    lock = threading.Lock()
+    lock.acquire()
+    assert not lock.acquire(timeout=3)
+    assert not lock.acquire(False)
+    assert not lock.acquire(timeout=0)
+
+
+def _reentrant_lock():
+    lock = threading.RLock()
+    has_it = threading.Event()
+
+    def hold():
+        with lock, lock:
+            has_it.set()
+            sleep(3)
+
+    threading.Thread(target=hold).start()
+    has_it.wait()
+    assert not lock.acquire(blocking=False)
+    with lock, lock:
+        assert lock.acquire(timeout=1)
+        lock.release()
+
+
+def _reentrant_lock_in_vain():
+    lock = threading.RLock()
+    _after(0, lock.acquire)
+    sleep(0.5)
+    assert not lock.acquire(timeout=2.5)
+
+
+def _condition():
+    condition = threading.Condition()
+    found = []
+
+    def give():
+        with condition:
+            found.append(1)
+            condition.notify_all()
+
+    _after(3, give)
+    with condition:
+        assert condition.wait_for(lambda: found, timeout=10)
+
+
+def _condition_held_twice():
+    condition = threading.Condition(threading.RLock())
+
+    def give():
+        with condition:
+            condition.notify()
+
+    _after(3, give)
+    with condition, condition:
+        assert condition.wait(10)
+
+
+def _condition_in_vain():
+    condition = threading.Condition()
+    with condition:
+        assert not condition.wait(3)
+
+
+def _event():
+    event = threading.Event()
+    _after(3, event.set)
+    assert event.wait()
+
+
+def _event_in_vain():
+    assert not threading.Event().wait(3)
+
+
+def _semaphore():
+    semaphore = threading.Semaphore(0)
+    _after(3, semaphore.release)
+    assert semaphore.acquire(timeout=10)
+
+
+def _bounded_semaphore_in_vain():
+    semaphore = threading.BoundedSemaphore(1)
+    with semaphore:
+        assert not semaphore.acquire(timeout=3)
+    with pytest.raises(ValueError, match='released too many times'):
+        semaphore.release()
+
+
+def _barrier():
+    barrier = threading.Barrier(3)
+    _after(1, barrier.wait)
+    _after(3, barrier.wait)
+    barrier.wait()
+
+
+def _broken_barrier():
+    with pytest.raises(threading.BrokenBarrierError):
+        threading.Barrier(2).wait(3)
+
+
+def _queue():
+    items = queue.Queue(1)
+    _after(3, items.put, 'a')
+    assert items.get() == 'a'
+
+
+def _full_queue():
+    items = queue.Queue(1)
+    items.put(1)
+    _after(1, items.get)
+    items.put(2, timeout=5)
+    with pytest.raises(queue.Full):
+        items.put(3, timeout=2)
+
+
+def _joined_queue():
+    items = queue.Queue()
+
+    def work():
+        while True:
+            sleep(items.get())
+            items.task_done()
+
+    threading.Thread(target=work, daemon=True).start()
+    items.put(1)
+    items.put(2)
+    items.join()
+
+
+def _priority_queue_in_vain():
+    with pytest.raises(queue.Empty):
+        queue.PriorityQueue().get(timeout=3)
+
+
+def _simple_queue():
+    items = queue.SimpleQueue()
+    _after(1, items.put, 'a')
+    assert items.get() == 'a'
+    with pytest.raises(queue.Empty):
+        items.get(timeout=2)
+    with pytest.raises(queue.Empty):
+        items.get(block=False)
+
+
+def _timer():
+    ended = threading.Event()
+    timer = threading.Timer(3, ended.set)
+    timer.start()
+    ended.wait()
+
+
+def _canceled_timer():
+    timer = threading.Timer(3, pytest.fail)
+    timer.start()
+    sleep(1)
+    timer.cancel()
+    timer.join()
+    sleep(2)
+
+
+def _pool():
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(lambda each: sleep(each) or each, [1, 2, 2])) == [1, 2, 2]
+
+
+def _pool_time_out():
+    with ThreadPoolExecutor(1) as pool:
+        future = pool.submit(sleep, 3)
+        with pytest.raises(TimeoutError):
+            future.result(timeout=1)
+        done, _ = wait_for_futures([future], timeout=1)
+        assert not done
+
+
+def _asyncio_sleeps():
+    async def main():
+        await asyncio.gather(asyncio.sleep(3), asyncio.sleep(2))
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(asyncio.Event().wait(), 0)
+
+    asyncio.run(main())
+
+
+def _asyncio_to_thread():
+    async def main():
+        await asyncio.gather(asyncio.to_thread(sleep, 3), asyncio.to_thread(sleep, 1))
+
+    asyncio.run(main())
+
+
+def _asyncio_from_a_thread():
+    async def main():
+        event = asyncio.Event()
+        _after(3, asyncio.get_running_loop().call_soon_threadsafe, event.set)
+        await event.wait()
+
+    asyncio.run(main())
+
+
+def _asyncio_coroutine_from_a_thread():
+    async def main():
+        loop = asyncio.get_running_loop()
+
+        def ask():
+            return asyncio.run_coroutine_threadsafe(asyncio.sleep(3, 'a'), loop).result()
+
+        assert await asyncio.to_thread(ask) == 'a'
+
+    asyncio.run(main())
+
+
+def _pipes(wait):
+    source, sink = os.pipe()
+    try:
+        _after(3, os.write, sink, b'a')
+        wait(source)
+        assert os.read(source, 1) == b'a'
+    finally:
+        os.close(source)
+        os.close(sink)
+
+
+def _select():
+    def wait(source):
+        assert select.select([source], [], [], 1) == ([], [], [])
+        assert select.select([source], [], []) == ([source], [], [])
+
+    _pipes(wait)
+
+
+def _poll():
+    def wait(source):
+        poll = select.poll()
+        poll.register(source, select.POLLIN)
+        assert poll.poll(1000) == []
+        assert poll.poll() == [(source, select.POLLIN)]
+
+    _pipes(wait)
+
+
+def _epoll():
+    def wait(source):
+        with select.epoll() as epoll:
+            epoll.register(source, select.EPOLLIN)
+            assert epoll.poll(timeout=1, maxevents=2) == []
+            assert epoll.poll(-1) == [(source, select.EPOLLIN)]
+
+    _pipes(wait)
+
+
+def _thread_join():
+    thread = threading.Thread(target=sleep, args=(3,))
+    thread.start()
+    thread.join(1)
+    assert thread.is_alive()
+    thread.join()
+    assert not thread.is_alive()
+    thread.join()
+
+
+def _low_level_thread():
+    ended = threading.Event()
+
+    def run(seconds, *, then):
+        sleep(seconds)
+        then()
+
+    _thread.start_new_thread(run, (3,), {'then': ended.set})
+    ended.wait()
+
+
+_WAITS = [
+    each
+    for name, each in list(globals().items())
+    if name.startswith('_') and name not in {'_after', '_pipes'} and callable(each)
+    and getattr(each, '__module__', '') == __name__
+]
+
+
+@pytest.mark.parametrize('wait', _WAITS, ids=lambda each: each.__name__[1:])
+def test_a_wait_takes_virtual_time(wait):
+    """Each of the functions above takes three seconds, and hardly any real time."""
+    begun = time.monotonic()
+    with virtual_time() as threads:
+        wait()
+        assert threads.now_ns == 3_000_000_000
+    assert time.monotonic() - begun < 2
+
+
+@pytest.mark.parametrize('wait', _WAITS, ids=lambda each: each.__name__[1:])
+def test_a_shuffled_wait_takes_as_long(wait):
+    for seed in range(5):
+        with virtual_time(seed) as threads:
+            wait()
+            assert threads.now_ns == 3_000_000_000
