@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from random import Random
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -120,21 +120,37 @@ class SimulatedSystem:
         """The exit code, once the system has ended, by itself or by `stop`."""
         return None if self._run is None else self._run.exit_code
 
-    def start(self) -> None:
+    def start(self, timeout: float | None = 60.0) -> None:
         """Create the nodes, and run their `on_start`; virtual time may pass.
 
+        Args:
+            timeout: How much, in seconds; `None` for no limit.
+
         Raises:
-            StartError: The system could not start.
+            StartError: The system could not start, in time.
         """
         try:
             self._prepare()
-            with self._threads.entered():
+            with self._threads.entered(), self._start_limit(timeout):
                 self._running.start()
         except BaseException:
             with self._threads.entered():
                 self._threads.close()
             self._stack.close()
             raise
+
+    @contextmanager
+    def _start_limit(self, timeout: float | None) -> Iterator[None]:
+        def give_up() -> None:
+            message = f'the system has not started within {timeout:g} s of virtual time'
+            raise StartError(message, help='does on_start wait for what the system does not have?')
+
+        if timeout is None:
+            yield
+            return
+        call = self._threads.call_at(to_ns(timeout), give_up)
+        yield
+        self._threads.cancel(call)
 
     def _prepare(self) -> None:
         stack, threads = self._stack, self._threads

@@ -46,7 +46,9 @@ def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..
 
     def start_new_thread(function: Any, arguments: Any, *keywords: Any) -> Any:
         is_called_by_python = isinstance(getattr(function, '__self__', None), threading.Thread)
-        is_valid = callable(function) and all(map(isinstance, (arguments, *keywords), (tuple, dict)))
+        is_valid = callable(function) and all(
+            map(isinstance, (arguments, *keywords), (tuple, dict))
+        )
         if threads.mine() is None or is_called_by_python or not is_valid:
             return start.original(function, arguments, *keywords)
         call = partial(function, *arguments, **(keywords[0] if keywords else {}))

@@ -7,6 +7,7 @@ but one is parked on a lock of its own.
 
 from __future__ import annotations
 
+import ctypes
 import heapq
 import itertools
 from collections import deque
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from random import Random
 
 _LOOK_SEC = 0.25
+# What a thread that was given up gets to end.
+_STUCK_SEC: Final = 1.0
+_STUCK_LOOK_SEC: Final = 0.01
 _ON_TIME: Final = 0
 _LATE: Final = 1
 _MOST_ROUNDS: Final = 1000
@@ -138,6 +142,7 @@ class SimulatedThreads:
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
         self._is_picking = False
+        self._stuck: SimulatedThread | None = None
         self._preemption = Preemption(shuffle, self.pause) if shuffle is not None else None
 
     def mine(self) -> SimulatedThread | None:
@@ -192,7 +197,8 @@ class SimulatedThreads:
         finally:
             thread.is_over = True
             del self.by_ident[thread.ident]
-            self._pass_on(self._pick())
+            if thread is self.current:
+                self._pass_on(self._pick())
 
     def start(self, function: Callable[..., Any], *args: Any) -> SimulatedThread:
         """Call a function in a new thread, when its turn comes."""
@@ -234,6 +240,9 @@ class SimulatedThreads:
         if me is None:
             message = 'a thread that takes no turns waits for those that do'
             raise RuntimeError(message)
+        if me.ident != get_ident():
+            # It was given up: others go on without it.
+            raise SystemExit
         if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
             raise SystemExit
         if me.on_wait is not None:
@@ -249,8 +258,10 @@ class SimulatedThreads:
             heapq.heappush(self._due, entry)
         if attempt is not None:
             self._waits[wait] = None
-        self._switch(me)
-        self._end(wait)
+        try:
+            self._switch(me)
+        finally:
+            self._end(wait)
         return wait.has_succeeded
 
     def sleep(self, duration_ns: int) -> None:
@@ -287,6 +298,18 @@ class SimulatedThreads:
             if not self._ready:
                 break
             self._let_others_end()
+        self._end_stuck()
+
+    def _end_stuck(self) -> None:
+        """End the thread that was given up, at its next line of Python."""
+        stuck, self._stuck = self._stuck, None
+        if stuck is None:
+            return
+        until = REAL.monotonic() + _STUCK_SEC
+        ident, error = ctypes.c_ulong(stuck.ident), ctypes.py_object(SystemExit)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, error)
+        while not stuck.is_over and REAL.monotonic() < until:
+            REAL.sleep(_STUCK_LOOK_SEC)
 
     def _end_all(self) -> None:
         """Have those who wait raise `SystemExit` in their turns."""
@@ -342,16 +365,19 @@ class SimulatedThreads:
             if (self.turns, self.now_ns) != seen:
                 seen, since = (self.turns, self.now_ns), REAL.monotonic()
             elif REAL.monotonic() - since > self.limit_sec:
-                stuck = self.current
+                stuck = self._stuck = self.current
                 self.current = me
+                if stuck is not None:
+                    stuck.is_ending = True
                 raise SimulationStuckError(stuck.ident if stuck else 0, self.limit_sec)
 
     def _pick(self) -> SimulatedThread:
         """Return the thread whose turn is next, at a later time if there is none now."""
         self._is_picking = True
-        thread = self._find()
-        self._is_picking = False
-        return thread
+        try:
+            return self._find()
+        finally:
+            self._is_picking = False
 
     def _find(self) -> SimulatedThread:
         ready = self._ready
@@ -411,7 +437,8 @@ class SimulatedThreads:
         if self._visitor is None:
             raise error
         self._visitor.error = error
-        self._ready.append(self._visitor)
+        if self._visitor not in self._ready:
+            self._ready.append(self._visitor)
 
     def _end(self, wait: _Wait) -> None:
         wait.is_over = True

@@ -1,3 +1,4 @@
+# ruff: noqa: DTZ002, DTZ003, DTZ005, DTZ006, DTZ011
 """Clocks show virtual time, to the threads that are in it."""
 
 import datetime as dt
@@ -111,17 +112,17 @@ def test_nanoseconds_are_exact():
     [
         lambda: time.sleep(-1),
         lambda: time.sleep('a'),
-        lambda: time.sleep(),
+        time.sleep,
         lambda: time.sleep(float('nan')),
         lambda: time.sleep(float('inf')),
         lambda: time.sleep(1e12),
         lambda: time.time(1),
-        lambda: time.clock_gettime(),
+        time.clock_gettime,
         lambda: time.clock_gettime('a'),
         lambda: time.clock_gettime(12345),
         lambda: time.localtime('a'),
         lambda: time.localtime(1, 2),
-        lambda: time.strftime(),
+        time.strftime,
         lambda: time.strftime('%Y', 3),
         lambda: time.asctime(1),
         lambda: datetime.now('UTC'),

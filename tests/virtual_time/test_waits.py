@@ -316,7 +316,9 @@ def _low_level_thread():
 _WAITS = [
     each
     for name, each in list(globals().items())
-    if name.startswith('_') and name not in {'_after', '_pipes'} and callable(each)
+    if name.startswith('_')
+    and name not in {'_after', '_pipes'}
+    and callable(each)
     and getattr(each, '__module__', '') == __name__
 ]
 

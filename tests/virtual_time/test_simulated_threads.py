@@ -1,0 +1,306 @@
+"""Threads that take turns: one at a time, always in the same order, and none is left behind."""
+
+import _thread
+import os
+import random
+import sys
+import threading
+import time
+import traceback
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from composer.virtual_time.simulated_threads import NothingHappensError, SimulationStuckError
+from tests.virtual_time.virtual_runs import virtual_time
+
+
+@given(
+    delays=st.lists(st.lists(st.integers(0, 3), max_size=5), max_size=6),
+    seed=st.none() | st.integers(0, 3),
+)
+def test_threads_run_in_the_same_order_each_time(delays, seed):
+    def run():
+        seen, lock = [], threading.Lock()
+
+        def work(name, pauses):
+            for each in pauses:
+                time.sleep(each)
+                with lock:
+                    seen.append((name, time.monotonic_ns()))
+                    time.sleep(each / 10)
+
+        with virtual_time(seed):
+            workers = [threading.Thread(target=work, args=each) for each in enumerate(delays)]
+            for each in workers:
+                each.start()
+            for each in workers:
+                each.join()
+        return seen
+
+    first = run()
+    assert [run(), run()] == [first, first]
+    assert [each[1] for each in first] == sorted(each[1] for each in first)
+    assert len(first) == sum(map(len, delays))
+
+
+def test_seeds_find_other_orders():
+    def run(seed):
+        seen = []
+
+        def work(name):
+            time.sleep(1)
+            seen.append(name)
+
+        with virtual_time(seed):
+            workers = [threading.Thread(target=work, args=(each,)) for each in range(4)]
+            for each in workers:
+                each.start()
+            for each in workers:
+                each.join()
+        return tuple(seen)
+
+    assert run(None) == (0, 1, 2, 3)
+    assert len({run(seed) for seed in range(40)}) > 10
+
+
+def test_a_shuffled_race_is_found():
+    """Two threads lose an update, where one is exchanged between a read and a write."""
+
+    def run(seed):
+        count = 0
+
+        def add():
+            nonlocal count
+            for _ in range(20):
+                seen = count
+                count = seen + 1
+
+        with virtual_time(seed):
+            workers = [threading.Thread(target=add) for _ in range(2)]
+            for each in workers:
+                each.start()
+            for each in workers:
+                each.join()
+        return count
+
+    assert run(None) == 40
+    counts = [run(seed) for seed in range(10)]
+    assert min(counts) < 40
+    assert counts == [run(seed) for seed in range(10)]
+
+
+def test_time_does_not_pass_while_somebody_runs():
+    with virtual_time() as threads:
+        begun = time.time()
+        sum(range(1_000_000))
+        assert time.time() == begun
+        assert threads.now_ns == 0
+
+
+def test_waits_for_what_never_comes_end():
+    with virtual_time(), pytest.raises(NothingHappensError):
+        threading.Event().wait()
+
+
+def test_a_wait_goes_on_after_nothing_happened():
+    with virtual_time() as threads:
+        with pytest.raises(NothingHappensError):
+            threading.Event().wait()
+        time.sleep(1)
+        assert threads.now_ns == 1_000_000_000
+
+
+def test_a_deadlock_ends():
+    first, second = threading.Lock(), threading.Lock()
+
+    def take():
+        with second:
+            time.sleep(1)
+            first.acquire()
+
+    with virtual_time(), first:
+        threading.Thread(target=take).start()
+        time.sleep(0.5)
+        with pytest.raises(NothingHappensError):
+            second.acquire()
+
+
+def _loop_without_end():
+    while True:
+        pass
+
+
+def _block_in_c():
+    source, sink = os.pipe()
+    threading.Timer(3, os.close, [sink]).start()
+    try:
+        os.read(source, 1)
+    finally:
+        os.close(source)
+
+
+def _start_and_wait(thread):
+    thread.start()
+    time.sleep(1)
+
+
+@pytest.mark.parametrize('function', [_loop_without_end, _block_in_c])
+def test_a_thread_that_never_waits_is_told_of(function):
+    before = threading.active_count()
+    with virtual_time(limit_sec=0.5):
+        thread = threading.Thread(target=function)
+        with pytest.raises(SimulationStuckError, match=r'within 0.5 s of real time') as caught:
+            _start_and_wait(thread)
+        stack = traceback.extract_stack(sys._current_frames()[caught.value.thread])
+        assert function.__name__ in [each.name for each in stack]
+        time.sleep(1 if function is _loop_without_end else 4)
+    assert threading.active_count() == before
+
+
+def test_one_that_was_given_up_does_no_more_harm():
+    """It ends where it would wait next, and the others go on."""
+    seen = []
+
+    def work():
+        begun = time.clock_gettime(time.CLOCK_PROCESS_CPUTIME_ID)
+        while time.clock_gettime(time.CLOCK_PROCESS_CPUTIME_ID) < begun + 1.0:
+            pass
+        time.sleep(1)
+        seen.append('given up')
+
+    with virtual_time(limit_sec=0.3) as threads:
+        with pytest.raises(SimulationStuckError):
+            threading.Thread(target=work).start()
+        with threads.outside():
+            time.sleep(1.2)
+        other = threading.Thread(target=lambda: time.sleep(2) or seen.append('other'))
+        other.start()
+        other.join()
+    assert seen == ['other']
+
+
+def test_an_error_in_a_thread_is_its_own(capsys, monkeypatch):
+    monkeypatch.setattr(threading, 'excepthook', lambda args: print(repr(args.exc_value)))
+
+    def fail():
+        time.sleep(1)
+        raise ValueError
+
+    with virtual_time():
+        thread = threading.Thread(target=fail)
+        thread.start()
+        thread.join()
+    assert capsys.readouterr().out == 'ValueError()\n'
+
+
+def _waits_for_ever():
+    threading.Event().wait()
+
+
+def _sleeps_long():
+    time.sleep(1e6)
+
+
+def _starts_others():
+    for _ in range(3):
+        threading.Thread(target=_waits_for_ever).start()
+    time.sleep(1e6)
+
+
+def _holds_a_lock():
+    lock = threading.Lock()
+
+    def hold():
+        with lock:
+            time.sleep(1e6)
+
+    threading.Thread(target=hold).start()
+    time.sleep(1)
+    with lock:
+        pass
+
+
+def _waits_again_and_again():
+    for _ in range(100):
+        try:
+            time.sleep(1e6)
+        finally:
+            time.sleep(1)
+
+
+def _does_not_want_to_end():
+    for _ in range(100):
+        with suppress(SystemExit):
+            threading.Event().wait()
+
+
+def _waits_in_a_condition():
+    condition = threading.Condition()
+
+    def wait():
+        with condition:
+            condition.wait()
+
+    for _ in range(3):
+        threading.Thread(target=wait).start()
+    wait()
+
+
+@pytest.mark.parametrize(
+    'function',
+    [
+        _waits_for_ever,
+        _sleeps_long,
+        _starts_others,
+        _holds_a_lock,
+        _waits_again_and_again,
+        _does_not_want_to_end,
+        _waits_in_a_condition,
+    ],
+)
+@pytest.mark.parametrize('seed', [None, 1])
+def test_no_thread_is_left_at_the_end(function, seed):
+    """Whatever they do then: they end, and nobody hears of errors that come of it."""
+    begun = time.monotonic()
+    with virtual_time(seed):
+        each = [threading.Thread(target=function, daemon=True) for _ in range(3)]
+        for thread in each:
+            thread.start()
+        time.sleep(10)
+    for thread in each:
+        thread.join(5)
+        assert not thread.is_alive()
+    assert time.monotonic() - begun < 5
+
+
+def test_one_that_has_not_begun_never_does():
+    seen = []
+    with virtual_time():
+        _thread.start_new_thread(seen.append, (1,))
+    assert seen == []
+
+
+def test_many_simulations_follow_each_other():
+    before = threading.active_count()
+    for _ in range(50):
+        with virtual_time() as threads:
+            ended = threading.Event()
+            threading.Timer(100, ended.set).start()
+            threading.Thread(target=_waits_for_ever).start()
+            ended.wait()
+            assert threads.now_ns == 100_000_000_000
+    assert threading.active_count() == before
+
+
+def test_chance_is_the_seed():
+    def run(seed):
+        with virtual_time(seed):
+            import secrets
+            import uuid
+
+            return random.random(), os.urandom(4), uuid.uuid4(), secrets.token_hex()
+
+    assert run(1) == run(1) != run(2)
