@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import Any
 
 _PLAIN = (str, bytes, bool, int, float, type(None))
 
@@ -40,11 +37,26 @@ def view_fields(value: Any) -> Any:
     return [view_fields(item) for item in value]
 
 
+def without_views(value: Any) -> Any:
+    """Return the value of an expression with the messages themselves in place of their views."""
+    if isinstance(value, MessageView):
+        return message_of(value)
+    if isinstance(value, list | tuple):
+        return [without_views(item) for item in value]
+    return value
+
+
+def message_of(view: MessageView) -> Any:
+    """Return the message of a view; a method of it would look like a field."""
+    return view._message  # noqa: SLF001
+
+
+def explain_error(error: Exception) -> str:
+    """Return why an expression over a message has no value."""
+    view = f"'{MessageView.__module__}.{MessageView.__name__} object'"
+    return str(error).replace(view, 'the message') or type(error).__name__
+
+
 def is_message(value: Any) -> bool:
     """Return whether a value is a message of a generated class."""
     return hasattr(value, 'get_fields_and_field_types')
-
-
-def field_names(message: Any) -> Iterator[str]:
-    """Yield the names of the fields of a message, in the order of its definition."""
-    return iter(message.get_fields_and_field_types())

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from jinja2 import StrictUndefined
+
 from composer.errors import ComposerError
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.sandbox import Sandbox
 from composer.expressions.scanner import OPEN, code_of, find_expressions
-from composer.scenarios.fields import view_fields
+from composer.scenarios.fields import explain_error, view_fields, without_views
 from composer.yaml_text.scalars import format_scalar
 
 
@@ -36,13 +38,20 @@ def compute_payload(data: Any, name: str, message: Any) -> Any:
     return _compute_text(data, {name: view_fields(message)})
 
 
+def _value_of(sandbox: Sandbox, code: str, scope: dict[str, Any]) -> Any:
+    value = evaluate_expression(sandbox, code, scope)
+    if isinstance(value, StrictUndefined):
+        str(value)  # raises what is undefined
+    return without_views(value)
+
+
 def _compute_text(text: str, scope: dict[str, Any]) -> Any:
     sandbox = Sandbox()
     try:
         expressions = list(find_expressions(text, sandbox))
-        values = [evaluate_expression(sandbox, code_of(text, each), scope) for each in expressions]
+        values = [_value_of(sandbox, code_of(text, each), scope) for each in expressions]
     except Exception as error:
-        message = f'{text!r}: {error}'
+        message = f'{text!r}: {explain_error(error)}'
         raise PayloadError(message) from error
     first = expressions[0]
     if len(expressions) == 1 and not (text[: first.start] + text[first.stop :]).strip():

@@ -33,7 +33,14 @@ SPEAKING = (
 )
 SPEAKING_FILES = ('entity_kinds.py', 'runtime/behaviours/import_check.py')
 # Words of the same form that are no rules.
-NO_RULES = {'find-pkg-share', 'nodl-xml', 'x-expected', 'site-packages', 'dist-packages'}
+NO_RULES = {
+    'find-pkg-share',
+    'nodl-xml',
+    'x-expected',
+    'site-packages',
+    'dist-packages',
+    'system-out',
+}
 # Names of which the code has one half, and a table the other.
 COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
     f'{word}-{kind.slug}' for word in ('unknown', 'unused') for kind in USED_KINDS

@@ -9,12 +9,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
 from composer.schema import SCENARIO_SCHEMA_NAME, schema_path
 from composer.schema.compiler import SchemaCompiler
 from composer.schema.validator import create_validator
 
 SCHEMA = json.loads(schema_path(SCENARIO_SCHEMA_NAME).read_text())
+CATALOGUE = InterfaceCatalogue()
 EDITOR = Draft202012Validator(SCHEMA)
 STRUCTURAL = {
     'missing-key', 'unknown-key', 'wrong-type', 'bad-value', 'out-of-range', 'conflicting-keys',
@@ -116,6 +119,8 @@ def documents(draw):
 
 def composer_accepts(data, path):
     loaded = load_scenarios(path, text=json.dumps(data).encode())
+    # Whatever is wrong, the rest can be checked.
+    assert check_scenarios(loaded, CATALOGUE) is not None
     rules = {each.rule for each in loaded.document.diagnostics}
     assert rules <= STRUCTURAL | {'unreadable-file'}
     without_end = [

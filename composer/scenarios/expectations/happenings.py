@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
     from composer.scenarios.outcomes import Outcome
@@ -38,7 +38,7 @@ class Happenings:
         outcomes: Of the steps.
         end_ns: When the case ended: as it says, or earlier if the system ended by itself.
         parameters: The values that parameters started with, by full names of nodes.
-        messages: By topics.
+        messages: The places of messages among the events, by topics.
         others: All other events, by their kinds.
     """
 
@@ -46,13 +46,15 @@ class Happenings:
     outcomes: Sequence[Outcome]
     end_ns: int
     parameters: ValuesByNode
-    messages: Mapping[str, list[PublishedMessage]] = field(default_factory=dict)
+    messages: Mapping[str, list[int]] = field(default_factory=dict)
     others: Mapping[str, list[Event]] = field(default_factory=dict)
 
-    def of_topic(self, topic: str, window: WindowSpec) -> Iterable[PublishedMessage]:
+    def of_topic(self, topic: str, window: WindowSpec) -> Iterator[PublishedMessage]:
         """Yield the messages of a topic in a window."""
-        found = self.messages.get(topic, ())
-        return (each for each in found if window.has(each.time_ns))
+        for index in self.messages.get(topic, ()):
+            event = self.events[index]
+            if window.has(event.time_ns):
+                yield PublishedMessage(index, event.time_ns, event.value)
 
     def of_kind(self, kind: str, window: WindowSpec | None = None) -> list[Event]:
         """Return the events of a kind in a window, or in the whole case."""
@@ -67,12 +69,11 @@ def sort_events(
     parameters: ValuesByNode | None,
 ) -> Happenings:
     """Return events by what expectations ask for."""
-    messages: dict[str, list[PublishedMessage]] = {}
+    messages: dict[str, list[int]] = {}
     others: dict[str, list[Event]] = {}
     for index, event in enumerate(events):
         if event.kind == 'message':
-            found = messages.setdefault(event.name, [])
-            found.append(PublishedMessage(index, event.time_ns, event.value))
+            messages.setdefault(event.name, []).append(index)
         elif event.kind != 'callback':
             others.setdefault(event.kind, []).append(event)
     exits = [event.time_ns for event in others.get('exit', ())]

@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.limits import Budget
 from composer.expressions.sandbox import Sandbox
-from composer.scenarios.fields import MessageView
+from composer.scenarios.fields import MessageView, explain_error
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 # The name of the whole message in a condition.
 MESSAGE = 'message'
+
+
+class _NoBudget(Budget):
+    """Counts no work: a case has thousands of messages, and runs behaviours of the same author."""
+
+    def spend(self, *_values: Any) -> None:
+        pass
+
+    def spend_on_parsing(self, code: str) -> None:
+        pass
+
+    def collect(self, items: Iterable[Any]) -> list[Any]:
+        return list(items)
 
 
 class ConditionError(ComposerError):
@@ -25,6 +41,7 @@ class Condition:
     def __init__(self, code: str) -> None:
         self.code = code
         self._sandbox = Sandbox()
+        self._sandbox.budget = _NoBudget()
         self._names: frozenset[str] | None = None
 
     def holds(self, message: Any) -> bool:
@@ -42,12 +59,9 @@ class Condition:
             # A field that is called so, too, hides the message, as in the checks.
             scope: dict[str, Any] = {MESSAGE: view}
             scope |= {name: getattr(view, name) for name in self._names if name in fields}
-            # It is one expression, whatever the number of messages is.
-            self._sandbox.budget = Budget()
             return bool(evaluate_expression(self._sandbox, self.code, scope))
         except Exception as error:
-            text = str(error) or type(error).__name__
-            raise ConditionError(text) from error
+            raise ConditionError(explain_error(error)) from error
 
 
 @lru_cache(maxsize=256)

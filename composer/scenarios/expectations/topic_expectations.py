@@ -171,7 +171,7 @@ def _find_outside(
     start, end = expected.window.start_ns, expected.window.end_ns
     if end is None:
         return None
-    every = happened.messages.get(expected.pattern.topic, ())
+    every = happened.of_topic(expected.pattern.topic, WindowSpec())
     others = sorted(
         (each for each in every if not expected.window.has(each.time_ns)),
         key=lambda each: max(start - each.time_ns, each.time_ns - end),
