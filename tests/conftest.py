@@ -12,6 +12,9 @@ from hypothesis import HealthCheck, settings
 from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
 
+# Runs pytest within tests, for the plugin.
+pytest_plugins = ('pytester',)
+
 # What hypothesis tries is the same in each run, and no test fails for the time that it takes.
 settings.register_profile(
     'steady',

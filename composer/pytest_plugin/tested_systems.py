@@ -33,6 +33,9 @@ with warnings.catch_warnings(), suppress(ImportError):
     warnings.simplefilter('ignore', DeprecationWarning)
     import rosidl_parser.parser  # noqa: F401
 
+# pytest shows where a test failed, and nothing of this module.
+__tracebackhide__ = True
+
 # Of what happened before a test failed, the end is shown.
 _MOST_EVENTS = 20
 # A behaviour that is looked at in a debugger takes its time.
@@ -123,7 +126,6 @@ class TestedSystems:
 
     def fail_for_errors(self) -> None:
         """Fail the test if a behaviour raised, and the test did not look at it."""
-        __tracebackhide__ = True
         errors = [
             event
             for system in self._systems
@@ -161,8 +163,8 @@ def _format(value: Any) -> str:
 
 
 def _refuse_errors(system: LoadedSystem) -> None:
-    findings = check_system(system, InterfaceCatalogue())
-    if has_errors(findings):
-        shown = '\n\n'.join(map(render_finding, findings))
+    errors = [each for each in check_system(system, InterfaceCatalogue()) if has_errors([each])]
+    if errors:
+        shown = '\n\n'.join(map(render_finding, errors))
         message = f'the system has errors:\n{shown}'
         raise ComposerError(message)

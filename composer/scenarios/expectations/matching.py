@@ -77,6 +77,8 @@ class Comparison:
         elif _is_array(expected) or _is_array(actual):
             yield from self._compare_arrays(expected, actual, path, item_type(type_name))
         elif not self._is_same(expected, actual, is_narrow=type_name == _FLOAT32):
+            if type_name == _FLOAT32:
+                expected, actual = _narrow(expected), _narrow(actual)
             yield Difference(path, expected, actual)
 
     def _compare_messages(
@@ -155,6 +157,15 @@ def _is_same_scalar(expected: Any, actual: Any) -> bool:
     if isinstance(expected, bytes) and len(expected) == 1 and _is_number(actual):
         return bool(expected[0] == actual)
     return type(expected) is type(actual) and bool(expected == actual)
+
+
+def _narrow(value: Any) -> Any:
+    """Return a number of 32 bits with no more digits than it needs: 0.2, not 0.200000003."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return value
+    rounded = c_float(value).value
+    near = (float(f'{rounded:.{digits}g}') for digits in range(1, 9))
+    return next((each for each in near if c_float(each).value == rounded), rounded)
 
 
 def _is_number(value: Any) -> bool:

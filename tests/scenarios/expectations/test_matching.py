@@ -55,6 +55,7 @@ def test_what_is_the_same_has_no_difference(expected, actual):
             scan(ranges=[1, 3, 4]),
             ['- ranges: 2 items', '+ ranges: 3 items', '  ranges:', '-   [1]: 2', '+   [1]: 3.0'],
         ),
+        ({'origin': {'x': 0.3}}, scan(0.1 + 2**-30), ['  origin:', '-   x: 0.3', '+   x: 0.1']),
         ({'rnages': 1}, scan(), ['- rnages: a field', '+ rnages: no such field']),
         (3, number(4.0), ['- data: 3', '+ data: 4.0']),
         (1, True, ['- 1', '+ true']),
