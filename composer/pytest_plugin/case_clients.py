@@ -17,7 +17,7 @@ def find_client(config: pytest.Config) -> CaseClient:
     from composer.scenarios.running.case_client import CaseClient
 
     if _client not in config.stash:
-        config.stash[_client] = CaseClient()
+        config.stash[_client] = CaseClient(folder=config.invocation_params.dir)
     return config.stash[_client]
 
 

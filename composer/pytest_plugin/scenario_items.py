@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -21,7 +22,6 @@ from composer.scenarios.scenario_files import load_scenarios
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from composer.diagnostics import Span
 
@@ -39,7 +39,7 @@ class ScenarioFile(pytest.File):
         Raises:
             CollectError: The file, or the system that it names, has errors.
         """
-        loaded = load_scenarios(self.path)
+        loaded = load_scenarios(Path(_shown(self)))
         findings = AbsentPackages().leave_out(check_scenarios(loaded, InterfaceCatalogue()))
         if has_errors(findings):
             raise self.CollectError('\n\n'.join(map(render_finding, findings)))
@@ -66,9 +66,9 @@ class ScenarioCase(pytest.Item):
             CaseFailedError: It failed.
         """
         captures = self.config.getoption('capture') != 'no'
-        request = CaseRequest(str(self.path), self.name, captures=captures)
+        request = CaseRequest(_shown(self), self.name, captures=captures)
         result = find_client(self.config).run(request)
-        report = CaseReport(_shown(self.path), self.name, self._span, result)
+        report = CaseReport(request.file, self.name, self._span, result)
         if not result.has_passed:
             raise CaseFailedError(render_failures(report))
 
@@ -83,7 +83,7 @@ class ScenarioCase(pytest.Item):
         return self.path, self._span.line - 1, self.name
 
 
-def _shown(path: Path) -> str:
-    """Return a path as the command line takes it from here."""
-    relative = os.path.relpath(path)
-    return str(path) if relative.startswith('..') else relative
+def _shown(node: ScenarioFile | ScenarioCase) -> str:
+    """Return the path of a file as the command line of this run takes it."""
+    relative = os.path.relpath(node.path, node.config.invocation_params.dir)
+    return str(node.path) if relative.startswith('..') else relative

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+from types import BuiltinFunctionType
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -58,13 +59,18 @@ class ReplacedFunction:
     """A builtin function that calls a Python function instead, wherever it is referred to.
 
     Args:
-        builtin: A function of a module, as `time.sleep`.
+        builtin: A function of a module, as `time.sleep`. One in Python is what a test has patched
+            it with, and stays.
 
     Attributes:
         original: A function that does what the builtin did.
     """
 
     def __init__(self, builtin: Any) -> None:
+        self.original: Any = builtin
+        self._is_builtin = isinstance(builtin, BuiltinFunctionType)
+        if not self._is_builtin:
+            return
         self._object = _BuiltinFunction.from_address(id(builtin))
         self._definition = self._object.definition
         self._owner = self._object.owner
@@ -73,12 +79,14 @@ class ReplacedFunction:
         self._copy = _MethodDef(before.name, before.function, before.flags, before.doc)
         _kept.append(self._copy)
         module = ctypes.cast(self._owner, ctypes.py_object).value if self._owner else None
-        self.original: Any = _api.PyCFunction_NewEx(
+        self.original = _api.PyCFunction_NewEx(
             ctypes.pointer(self._copy), ctypes.py_object(module), None
         )
 
     def replace(self, function: Callable[..., Any]) -> None:
         """Have `function` called, which takes the arguments by their positions."""
+        if not self._is_builtin:
+            return
         caller = _CALLERS[self._copy.flags]
         address = ctypes.cast(getattr(_api, caller), ctypes.c_void_p).value
         calling = _MethodDef(self._copy.name, address, self._copy.flags, self._copy.doc)
@@ -89,8 +97,9 @@ class ReplacedFunction:
 
     def restore(self) -> None:
         """Undo `replace`."""
-        self._object.definition = self._definition
-        self._object.owner = self._owner
+        if self._is_builtin:
+            self._object.definition = self._definition
+            self._object.owner = self._owner
 
 
 class ReplacedMethod:

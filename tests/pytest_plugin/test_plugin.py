@@ -86,7 +86,9 @@ def test_a_file_with_errors_is_an_error_of_the_collection(run):
     broken = SCENARIO.replace('/scan', '/scann')
     result = run(**{'car.scenario.yaml': broken})
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(['*car.scenario.yaml:7:*error[[]*', "*did you mean '/scan'?"])
+    result.stdout.fnmatch_lines(
+        ['tests/car.scenario.yaml:7:*error[[]*', "*did you mean '/scan'?*"]
+    )
 
 
 DRIVING = """

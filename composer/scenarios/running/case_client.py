@@ -39,9 +39,13 @@ class CaseClient:
 
     Args:
         environment: Variables to set beside those that all cases have.
+        folder: Where relative paths start; `None` for the working folder.
     """
 
-    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, environment: Mapping[str, str] | None = None, folder: Path | None = None
+    ) -> None:
+        self._started_in = folder
         self._environment = dict(environment or {})
         self._numbers = count()
         self._process: subprocess.Popen[bytes] | None = None
@@ -71,6 +75,7 @@ class CaseClient:
                 [*command, str(its.fileno()), str(Path(__file__).parents[3])],
                 env={**fix_environment(os.environ, self._folder), **self._environment},
                 pass_fds=[its.fileno()],
+                cwd=self._started_in,
             )
         self._connection = own
 
