@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import heapq
 import itertools
+import time
 from collections import deque
 from contextlib import contextmanager
 from operator import itemgetter
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from random import Random
 
 _LOOK_SEC = 0.25
+# A thread that waits in C does no work: it may take so much longer.
+_WAITED_FACTOR: Final = 3
 # What a thread that was given up gets to end.
 _STUCK_SEC: Final = 1.0
 _STUCK_LOOK_SEC: Final = 0.01
@@ -117,7 +120,7 @@ class SimulatedThreads:
 
     Args:
         shuffle: Chooses among the orders that are possible; `None` for first come, first served.
-        limit_sec: How much real time a thread may use without a wait.
+        limit_sec: How much processor time a thread may use without a wait.
 
     Attributes:
         now_ns: The virtual time, from 0.
@@ -360,16 +363,24 @@ class SimulatedThreads:
         if me is not self._visitor:
             REAL.acquire(me.turn)
             return
-        seen, since = (self.turns, self.now_ns), REAL.monotonic()
+        seen, since = (self.turns, self.now_ns), (REAL.monotonic(), 0.0)
         while not REAL.acquire(me.turn, True, _LOOK_SEC):
+            now = REAL.monotonic(), _work_of(self.current)
             if (self.turns, self.now_ns) != seen:
-                seen, since = (self.turns, self.now_ns), REAL.monotonic()
-            elif REAL.monotonic() - since > self.limit_sec:
+                seen, since = (self.turns, self.now_ns), now
+            elif self._is_too_long(now[0] - since[0], now[1] - since[1]):
                 stuck = self._stuck = self.current
                 self.current = me
                 if stuck is not None:
                     stuck.is_ending = True
                 raise SimulationStuckError(stuck.ident if stuck else 0, self.limit_sec)
+
+    def _is_too_long(self, real_sec: float, work_sec: float) -> bool:
+        """Tell whether a thread that has not waited for so long is stuck.
+
+        Its own work counts: on a crowded machine it may have to wait for a processor.
+        """
+        return work_sec > self.limit_sec or real_sec > _WAITED_FACTOR * self.limit_sec
 
     def _pick(self) -> SimulatedThread:
         """Return the thread whose turn is next, at a later time if there is none now."""
@@ -443,3 +454,10 @@ class SimulatedThreads:
     def _end(self, wait: _Wait) -> None:
         wait.is_over = True
         self._waits.pop(wait, None)
+
+
+def _work_of(thread: SimulatedThread | None) -> float:
+    """Return how much processor time a thread has used, in seconds."""
+    if thread is None or not thread.ident:
+        return 0.0
+    return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))

@@ -92,7 +92,7 @@ class _CaseRun:
             self.steps.schedule()
             if self._input:
                 self._input.schedule()
-            simulated.start()
+            simulated.start(timeout=case.until_ns / NANOSECONDS)
             self._note_parameters()
             simulated.forward(max(0.0, case.until_ns / NANOSECONDS - simulated.now))
             self._stop()
