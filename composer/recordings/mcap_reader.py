@@ -48,16 +48,18 @@ def read_content(path: Path) -> FileContent:
     with _reading(path) as stream:
         _check_magic(path, stream)
         summary = make_reader(stream).get_summary() if _has_end(stream) else None
-        if summary is None or summary.statistics is None:
+        if summary is None or not (summary.statistics or summary.chunk_indexes):
+            stream.seek(0)
             return _scan(path, stream)
-        statistics = summary.statistics
-        counts = statistics.channel_message_counts
-        topics = _describe_topics(
-            summary.channels,
-            summary.schemas,
-            {key: counts.get(key, 0) for key in summary.channels},
-        )
-        return FileContent(topics, statistics.message_start_time, statistics.message_end_time)
+        statistics, chunks = summary.statistics, summary.chunk_indexes
+        counts: dict[int, int] | None = None
+        start_ns = min((each.message_start_time for each in chunks), default=0)
+        end_ns = max((each.message_end_time for each in chunks), default=0)
+        if statistics is not None:
+            counts = statistics.channel_message_counts
+            start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
+        topics = _describe_topics(summary.channels, summary.schemas, counts)
+        return FileContent(topics, start_ns, end_ns)
 
 
 def _scan(path: Path, stream: IO[bytes]) -> FileContent:
@@ -78,22 +80,25 @@ def _scan(path: Path, stream: IO[bytes]) -> FileContent:
             counts[each.channel_id] += 1
             start_ns = min(start_ns or each.log_time, each.log_time)
             end_ns = max(end_ns, each.log_time)
-    topics = _describe_topics(channels, schemas, {key: counts[key] for key in channels})
+    topics = _describe_topics(channels, schemas, counts)
     return FileContent(topics, start_ns, end_ns, ''.join(problems))
 
 
 def _describe_topics(
-    channels: Mapping[int, Channel], schemas: Mapping[int, Schema], counts: Mapping[int, int]
+    channels: Mapping[int, Channel],
+    schemas: Mapping[int, Schema],
+    counts: Mapping[int, int] | None,
 ) -> list[RecordedTopic]:
     found: dict[tuple[str, str], RecordedTopic] = {}
     for number, channel in channels.items():
-        topic = _describe_topic(channel, schemas.get(channel.schema_id), counts[number])
+        count = None if counts is None else counts.get(number, 0)
+        topic = _describe_topic(channel, schemas.get(channel.schema_id), count)
         key = topic.name, topic.type
         found[key] = joined(found[key], topic) if key in found else topic
     return list(found.values())
 
 
-def _describe_topic(channel: Channel, schema: Schema | None, count: int) -> RecordedTopic:
+def _describe_topic(channel: Channel, schema: Schema | None, count: int | None) -> RecordedTopic:
     encoding = channel.message_encoding
     type_name = _full_type_name(schema.name if schema else '')
     problem = ''

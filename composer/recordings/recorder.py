@@ -118,7 +118,7 @@ class Recorder:
         if not self._stream.closed:
             try:
                 self._drain()
-                self._complete()
+                self._complete(goes_on=goes_on)
             except OSError as error:
                 self._fail(error)
         target = self._place.target
@@ -162,14 +162,15 @@ class Recorder:
         self.room = int(min(max(_MOST_BYTES / (size + 1), _FEWEST_MESSAGES), _MOST_MESSAGES))
         self._writer.add_messages(entries)
 
-    def _complete(self) -> None:
+    def _complete(self, *, goes_on: bool) -> None:
         self._writer.define_all()
         described = metadata.describe_recording(self._writer, self._place.file.name)
         text = metadata.render_metadata(described, is_file=False)
         self._writer.add_metadata(metadata.RECORD_NAME, {'serialized_metadata': text})
         self._writer.finish()
         self._stream.close()
-        self._place.write_metadata(metadata.render_metadata(described, is_file=True))
+        if not goes_on or self._place.is_folder:
+            self._place.write_metadata(metadata.render_metadata(described, is_file=True))
 
     def _fail(self, error: Exception) -> None:
         """End the recording: the file has what was written so far."""

@@ -28,6 +28,11 @@ class RecordingPlace:
     target: Path
     file: Path
 
+    @property
+    def is_folder(self) -> bool:
+        """Whether the target is a folder."""
+        return self.target != self.file
+
     def create(self) -> IO[bytes]:
         """Create the file, and its folder if that is the target; return it, open for writing.
 
@@ -39,7 +44,7 @@ class RecordingPlace:
             message = f"'{self.target}' exists, and is not overwritten"
             raise UsageError(message, help='name another file for the recording')
         try:
-            if self.target != self.file:
+            if self.is_folder:
                 self.target.mkdir()
             return self.file.open('xb', buffering=0)
         except FileNotFoundError as error:

@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
 
 from composer.recordings.reading import read_recording
@@ -160,9 +160,9 @@ def test_what_is_not_of_ros_2_is_named_and_left_out(tmp_path, encoding, type_nam
     assert list(recording.messages()) == []
 
 
-def write_foreign(path, encoding, type_name, compression=CompressionType.NONE):
+def write_foreign(path, encoding, type_name, **options):
     """Write what another program could have written."""
-    writer = Writer(str(path), compression=compression)
+    writer = Writer(str(path), **{'compression': CompressionType.NONE} | options)
     writer.start()
     schema = writer.register_schema(type_name, 'ros2msg', STRING.encode()) if type_name else 0
     channel = writer.register_channel('/a', encoding, schema)
@@ -192,6 +192,20 @@ def test_a_topic_of_another_definition_is_left_out(tmp_path):
             'std_msgs/msg/String was recorded with another definition than the installed one'
         )
     }
+
+
+def test_a_file_without_counts_or_without_an_index_is_read_all_the_same(tmp_path):
+    for number, options in enumerate(
+        ({'use_statistics': False}, {'use_chunking': False}, {'index_types': IndexType.NONE})
+    ):
+        path = tmp_path / f'{number}.mcap'
+        write_foreign(path, 'cdr', 'std_msgs/String', **options)
+
+        recording = read_recording(path)
+
+        assert [each.data for _, _, each in recording.messages()] == ['text'], options
+        assert recording.topics[0].count in {None, 1}
+        assert (recording.start_ns, recording.end_ns, recording.problem) == (5, 5, '')
 
 
 def test_damage_is_an_error_where_it_is_met(tmp_path):
