@@ -23,6 +23,7 @@ from composer.runtime.environment import environment_set
 from composer.runtime.rewiring.reading import Reading
 from composer.simulation.events import Event
 from composer.simulation.missed_deadlines import MissedDeadlines
+from composer.simulation.project_modules import forgotten_modules
 from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
 from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
 from composer.virtual_time.clocks import to_ns
@@ -181,7 +182,9 @@ class SimulatedSystem:
         prefixes = import_declared(context.interfaces, lambda _line: None)
         variables = {**context.spec.environment, **extend_variables({}, prefixes)}
         self._stack.enter_context(environment_set({**variables, **_ALONE}))
-        self._stack.enter_context(project_on_path(project_search_path(self._system.files)))
+        folders = project_search_path(self._system.files)
+        self._stack.enter_context(project_on_path(folders))
+        self._stack.enter_context(forgotten_modules(folders))
         functions, _findings = import_behaviours(context)
         snapshot = take_snapshot(context, prefixes)
         driver = load_system_text(_DRIVER_FILE).spec

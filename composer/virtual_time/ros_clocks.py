@@ -83,7 +83,7 @@ def _replacements(
 
     def now_virtually(self: Any) -> Time:
         thread = threads.mine()
-        if thread is None or self.clock_type is ClockType.ROS_TIME:
+        if thread is None or getattr(self, 'ros_time_is_active', False):
             return now(self)
         threads.count_look(thread)
         is_steady = self.clock_type is ClockType.STEADY_TIME

@@ -34,11 +34,12 @@ _STUCK_LOOK_SEC: Final = 0.01
 _ON_TIME: Final = 0
 _LATE: Final = 1
 _MOST_ROUNDS: Final = 1000
-# Who looks so often without a wait waits for the time: a look takes a microsecond then, and a
-# wait of no length 50, about as long as they do.
+# Who looks so often without a wait waits for the time: it passes then at each so many looks more.
+# A wait of no length counts as some.
 _MOST_LOOKS: Final = 1000
-_LOOKS_NS: Final = 1_000_000
-_LOOKS_PER_WAIT: Final = 50
+_LOOKS_PER_STEP: Final = 100
+_LOOKS_PER_WAIT: Final = 10
+_STEP_NS: Final = 1_000_000
 
 # When, whether after all else at that time, a number that keeps the order, and what.
 _Due: TypeAlias = 'tuple[int, int, int, _Wait | _Call]'
@@ -254,7 +255,7 @@ class SimulatedThreads:
         is_long = timeout_ns is None or timeout_ns > 0
         me.looks = 0 if is_long else me.looks + _LOOKS_PER_WAIT
         if me.looks > _MOST_LOOKS:
-            me.looks, timeout_ns = 0, _LOOKS_NS
+            me.looks, timeout_ns = _MOST_LOOKS - _LOOKS_PER_STEP, _STEP_NS
         if timeout_ns is not None:
             until_ns = self.now_ns + max(timeout_ns, 0)
             entry = (until_ns, _LATE if is_late else _ON_TIME, next(self._numbers), wait)
@@ -278,7 +279,8 @@ class SimulatedThreads:
         """
         thread.looks += 1
         if thread.looks > _MOST_LOOKS and thread is self.current and not self._is_picking:
-            self.sleep(_LOOKS_NS)
+            self.sleep(_STEP_NS)
+            thread.looks = _MOST_LOOKS - _LOOKS_PER_STEP
 
     def pause(self) -> None:
         """Let others run first, if any can."""
