@@ -51,6 +51,8 @@ def test_nobody_sees_the_changes_of_others(compose):
     code = Path(mutating_behaviours.__file__).read_text()
 
     child = compose(json.dumps(system), code)
+    # To create so many nodes takes a while of its own.
+    child.wait_until_ready()
 
     told = child.wait_for_line('[conductor]: ')
     assert told.endswith(': found []')
