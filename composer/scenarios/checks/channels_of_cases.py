@@ -40,6 +40,17 @@ def explain_unknown(
     )
 
 
+def explain_left_out(
+    context: ScenarioContext, kind: ChannelKind, name: str, *, provides: bool
+) -> str | None:
+    """Return the help if it is an external process that has the end that nodes lack."""
+    channel = context.channel(kind, name)
+    ends = (channel.providers if provides else channel.users) if channel else []
+    if not ends:
+        return None
+    return f'{ends[0].owner} does, but external processes are left out'
+
+
 def check_type(
     context: ScenarioContext, kind: ChannelKind, name: str, path: DataPath
 ) -> Iterator[Diagnostic]:

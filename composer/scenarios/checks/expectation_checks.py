@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.descriptions import MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.scenarios.checks.channels_of_cases import (
+    explain_left_out,
     explain_unknown,
     is_known,
     publishes_itself,
@@ -87,7 +88,9 @@ def _check_publisher(
     if not is_known(context, 'topic', topic):
         yield explain_unknown(context, 'topic', topic, at)
         return
-    yield context.at_value(at, 'no-publisher', f"no node of this system publishes '{topic}'")
+    message = f"no node of this system publishes '{topic}'"
+    help_text = explain_left_out(context, 'topic', topic, provides=True)
+    yield context.at_value(at, 'no-publisher', message, help=help_text)
 
 
 def _check_like(

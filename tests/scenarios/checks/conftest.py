@@ -36,6 +36,11 @@ nodes:
   driver:
     lifecycle: true
     on_activate: moves:activate
+processes:
+  camera:
+    command: [sleep, '1']
+    publishers:
+      image: {{type: std_msgs/msg/String, topic: /image, external: true}}
 """
 CODE = """\
 def hear(node, message):

@@ -67,6 +67,8 @@ WRONG = [
     ({'then': '{topic: /sped}'},
      "/sped unknown-topic: the system has no topic '/sped' (did you mean '/speed'?)"),
     ({'then': '{topic: /scan}'}, "/scan no-publisher: no node of this system publishes '/scan'"),
+    ({'then': '{topic: /image}'}, "/image no-publisher: no node of this system publishes '/image' "
+     "(process 'camera' does, but external processes are left out)"),
     # Fields.
     ({'when': '{publish: /scan, message: {rangs: [1]}}'},
      "rangs unknown-field: sensor_msgs/msg/LaserScan has no field 'rangs' (did you mean 'ranges'? its fields are header, angle_min, angle_max, "
