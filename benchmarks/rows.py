@@ -151,6 +151,20 @@ def _recording() -> list[Row]:
     return [row('all in all', 'cpu_us'), row('in the behaviour', 'publish_us')]
 
 
+def _simulated() -> list[Row]:
+    def row(size: int, target: float) -> Row:
+        ours, other = (_side('simulated', side, size, 'speed') for side in ('virtual', 'real'))
+        what = f'{size} nodes at 10 Hz, virtual s in a second, against real time'
+        return Row(what, ours, other, times, '>=', target)
+
+    def start(size: int) -> Row:
+        ours = _side('simulated', 'case', size, 'start_sec')
+        return Row(f's a case of {size} nodes after the first', ours, None, alone, '<=', 0.3)
+
+    # An hour of 20 nodes in half a minute.
+    return [row(2, 600), row(20, 120), row(200, 10), start(2), start(20)]
+
+
 def _forty() -> list[Row]:
     def side(name: str, key: str) -> Side:
         return _side('forty', name, 40, key)
@@ -297,6 +311,7 @@ ROWS: list[Row] = [
     *_large_messages(),
     *_overhead(),
     *_recording(),
+    *_simulated(),
     *_forty(),
     *_further_node(),
     *_thousand(),

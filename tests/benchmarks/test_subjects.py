@@ -27,6 +27,7 @@ TINY = {
     'reloads': 5,
     'round_trips': 1,
     'save_to_callback': 3,
+    'simulated': 2,
     'soak': 100,
     'start_stop': 2,
     'thousand': 2,

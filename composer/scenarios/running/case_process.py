@@ -26,10 +26,6 @@ _PR_SET_PDEATHSIG = 1
 _GRACE_SEC = 5.0
 # Of longer output, the end is kept.
 _LONGEST_OUTPUT = 200_000
-# Around each line of the log on standard error, which is known from the events.
-_LOG_START, _LOG_END = '\x1e', '\x1f'
-LOG_FORMAT = f'{_LOG_START}[{{severity}}] [{{name}}]: {{message}}{_LOG_END}'
-_LOGGED = re.compile(f'{_LOG_START}[^{_LOG_END}]*{_LOG_END}\n?')
 _TIMEOUT = re.compile(r'^Timeout \(.*\)!\n', re.MULTILINE)
 
 _prctl = ctypes.CDLL(None).prctl
@@ -79,7 +75,7 @@ class CaseProcess:
             result,
             real_sec=real_sec,
             output=_read_end(self._output),
-            errors=_LOGGED.sub('', _read_end(self._errors)),
+            errors=_read_end(self._errors),
         )
         for file in (self._result, self._stack, self._output, self._errors):
             file.close()

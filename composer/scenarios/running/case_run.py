@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
+from composer.language.specs import ParameterFileSpec
 from composer.recordings.reading import read_recording
+from composer.ros_parameters.file_writer import render_parameter_file
+from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
 from composer.scenarios.expectations.evaluation import evaluate
 from composer.scenarios.running.case_results import CaseFailure, CaseResult
 from composer.scenarios.running.case_steps import CaseSteps
@@ -24,11 +29,19 @@ from composer.simulation.simulated_system import SimulatedSystem
 from composer.simulation.trace import render_event
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import NodeSpec
     from composer.scenarios.running.case_results import CaseRequest
     from composer.scenarios.scenario_files import LoadedScenarios
     from composer.scenarios.specs import CaseSpec, ValuesByNode
     from composer.virtual_time.unrepeatable import Notice
+
+
+# A behaviour may use so much of the limit of its case before it counts as stuck: the rest is for
+# telling so, with the events before.
+_SHARE = 0.8
 
 
 def run_case(loaded: LoadedScenarios, case: CaseSpec, request: CaseRequest) -> CaseResult:
@@ -39,7 +52,7 @@ def run_case(loaded: LoadedScenarios, case: CaseSpec, request: CaseRequest) -> C
     """
     seed = (case.seed if request.seed is None else request.seed) + max(0, request.shuffle - 1)
     try:
-        run = _CaseRun(loaded, case, seed, is_shuffled=request.shuffle > 0)
+        run = _CaseRun(loaded, case, seed, request)
     except ComposerError as error:
         return CaseResult((CaseFailure('start', str(error)),), seed)
     failures = run.run()
@@ -62,7 +75,7 @@ class _CaseRun:
     """One run of a case."""
 
     def __init__(
-        self, loaded: LoadedScenarios, case: CaseSpec, seed: int, *, is_shuffled: bool
+        self, loaded: LoadedScenarios, case: CaseSpec, seed: int, request: CaseRequest
     ) -> None:
         if loaded.system is None:
             message = f'{loaded.path}: its system cannot be read'
@@ -76,8 +89,10 @@ class _CaseRun:
         self.simulated = SimulatedSystem(
             with_parameters(loaded.system, given.parameters),
             seed=seed,
-            is_shuffled=is_shuffled,
+            is_shuffled=request.shuffle > 0,
             start_time_ns=recording.start_ns if recording else None,
+            real_limit_sec=_SHARE * (request.real_time_limit_sec or case.real_time_limit_sec),
+            shows_log=not request.captures,
         )
         self.steps = CaseSteps(self.simulated, loaded, case)
         self._input = (
@@ -130,26 +145,29 @@ def with_parameters(system: LoadedSystem, values: ValuesByNode) -> LoadedSystem:
     """
     if not values or system.spec is None:
         return system
-    nodes = dict(system.spec.nodes)
-    for key, node in nodes.items():
-        given = values.get(node.full_name, {})
-        parameters = {
-            name: replace(spec, value=_converted(spec.type, given[name]))
-            if name in given
-            else spec
-            for name, spec in node.parameters.items()
-        }
-        nodes[key] = replace(node, parameters=parameters)
+    nodes = {
+        key: _with_values(node, values.get(node.full_name, {}))
+        for key, node in system.spec.nodes.items()
+    }
     return replace(system, spec=replace(system.spec, nodes=nodes))
 
 
-def _converted(type_name: str | None, value: object) -> object:
-    """Return a value as its type has it: YAML writes a double without a point as an integer."""
-    if type_name == 'double' and isinstance(value, int):
-        return float(value)
-    if type_name == 'double_array' and isinstance(value, list):
-        return [float(each) for each in value]
-    return value
+def _with_values(node: NodeSpec, values: Mapping[str, Any]) -> NodeSpec:
+    parameters, typed = dict(node.parameters), {}
+    for name, value in values.items():
+        spec = parameters.get(name)
+        type_name = (spec and spec.type) or infer_parameter_type(value)
+        typed[name] = str(type_name), convert_parameter_value(value, type_name)
+        if spec is not None:
+            parameters[name] = replace(spec, value=typed[name][1])
+    files = node.parameter_files
+    if files and values:
+        # The last one wins.
+        handle, path = tempfile.mkstemp('.yaml', 'given-', os.environ.get('ROS_LOG_DIR'))
+        with os.fdopen(handle, 'w', encoding='utf-8') as file:
+            file.write(render_parameter_file({node.full_name: typed}))
+        files = (*files, ParameterFileSpec(path))
+    return replace(node, parameters=parameters, parameter_files=files)
 
 
 def _write_trace(path: str, simulated: SimulatedSystem) -> None:

@@ -102,12 +102,5 @@ def test_what_it_has_started_ends_with_it(wait_for):
     wait_for(lambda: not is_alive(pid), 'the end of what it has started')
 
 
-def test_lines_of_the_log_are_no_output():
-    def log():
-        sys.stderr.write('before\n\x1e[INFO] [node]: two\nlines\x1f\nafter\n')
-
-    assert run(log).errors == 'before\nafter\n'
-
-
 def test_of_much_output_the_end_is_kept():
     assert run(lambda: print('x' * 300_000 + 'end')).output.endswith('xend\n')
