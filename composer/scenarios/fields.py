@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_PLAIN = (str, bytes, bool, int, float, type(None))
+_PLAIN = (str, bool, int, float, type(None))
 
 
 class MessageView:
@@ -26,9 +26,14 @@ class MessageView:
 
 
 def view_fields(value: Any) -> Any:
-    """Return a value of a field as expressions see it: messages as views, arrays as lists."""
+    """Return a value of a field as expressions see it: messages as views, arrays as lists.
+
+    A field of the type `byte` is a number, as files write it; `bytes` have no literal there.
+    """
     if isinstance(value, _PLAIN):
         return value
+    if isinstance(value, bytes):
+        return value[0] if len(value) == 1 else list(value)
     if is_message(value):
         return MessageView(value)
     if hasattr(value, 'tolist'):

@@ -174,9 +174,11 @@ def _explain_bound(error: ValidationError) -> Iterator[Violation]:
     limit = f'{error.validator_value:.9f}'.rstrip('0').rstrip('.')
     unit = _BOUND_UNITS.get(keyword, '')
     plural = 's' if unit and error.validator_value != 1 else ''
+    is_list = isinstance(error.instance, list) and error.instance
+    found = f'{len(error.instance)}' if is_list else show_value(error.instance)
     yield Violation(
         'out-of-range',
-        f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, got {show_value(error.instance)}',
+        f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, got {found}',
         path,
         droppable(path),
     )

@@ -8,6 +8,7 @@ more than 64 bytes are base64.
 from __future__ import annotations
 
 import math
+import re
 from base64 import b64encode
 from json.encoder import encode_basestring, encode_basestring_ascii
 from operator import attrgetter
@@ -26,12 +27,19 @@ _BYTES = ('octet', 'uint8', 'int8', 'char')
 # Longer arrays of bytes are images and the like: nobody reads them as numbers.
 _MOST_BYTES_SHOWN = 64
 _SPECIAL = {'nan': '.nan', 'inf': '.inf', '-inf': '-.inf'}
+# What a traceback says before the error itself; in a log it may be indented.
+_FRAMES = re.compile(r'^( *)Traceback .*\n(?:\1 +.*\n)*', re.MULTILINE)
 
 
 def render_event(event: Event) -> str:
     """Return an event as one line: time, kind, node, name and value; `-` for what it lacks."""
     seconds, rest = divmod(event.time_ns, _NANOSECONDS)
-    value = _last_line(event.value) if event.kind == 'error' else event.value
+    value = event.value
+    if event.kind == 'error':
+        value = error_line(value)
+    elif event.kind == 'log':
+        # Frames name files of this machine.
+        value = _FRAMES.sub('', value)
     return (
         f'{seconds}.{rest:09d} {event.kind} {event.node or "-"} {event.name or "-"} '
         f'{render_value(value)}'
@@ -47,9 +55,10 @@ def render_value(value: Any) -> str:
     return renderer(value)
 
 
-def _last_line(traceback: Any) -> Any:
-    """Return the error itself: the lines before name files of this machine."""
-    return traceback.rstrip().rpartition('\n')[2] if isinstance(traceback, str) else traceback
+def error_line(traceback: str) -> str:
+    """Return the error of a traceback in one line: without frames, which name files, and notes."""
+    *_, last = _FRAMES.split(f'\n{traceback}')
+    return last.strip().partition('\n')[0]
 
 
 def _create_renderer(kind: type) -> Renderer:

@@ -171,8 +171,8 @@ cases:
         ('then: [{topic: /a, log: b}]', "6:24 conflicting-keys: 'topic' and 'log' cannot be used "
          'together in expectation (keep one of them)'),
         ('then: [{log: b, where: a}]', "6:21 missing-key: 'where' requires 'topic'"),
-        ('then: [{topic: /a, within: [1]}]', '6:32 out-of-range: expected at least 2 items, got a list'),
-        ('then: [{topic: /a, within: [1, 2, 3]}]', '6:32 out-of-range: expected at most 2 items, got a list'),
+        ('then: [{topic: /a, within: [1]}]', '6:32 out-of-range: expected at least 2 items, got 1'),
+        ('then: [{topic: /a, within: [1, 2, 3]}]', '6:32 out-of-range: expected at most 2 items, got 3'),
         ('then: [{topic: /a, rate: [1, 2], within: [1, 2]}]', "6:38 conflicting-keys: 'rate' and "
          "'within' cannot be used together in expectation (keep one of them)"),
         ('then: [{topic: /a b}]', '6:20 bad-value: expected a full name, as in /scan; got '

@@ -1,6 +1,7 @@
 """Events and messages as text: one line, all digits, the same on every machine."""
 
 import math
+from textwrap import indent
 
 import pytest
 from hypothesis import given
@@ -50,6 +51,18 @@ def test_text_stays_on_one_line(text):
     assert rendered.encode()
 
 
+# An error that another one caused, up to its own name.
+CAUSE = """Traceback (most recent call last):
+  File "/home/me/a.py", line 1, in f
+    raise ValueError('no')
+ValueError: no
+
+Traceback (most recent call last):
+  File "/home/me/b.py", line 2, in g
+    raise SystemExit(3)
+"""
+
+
 @pytest.mark.parametrize(
     ('event', 'line'),
     [
@@ -59,6 +72,15 @@ def test_text_stays_on_one_line(text):
             Event(7, 'error', '/n', "timer 'tick'", 'Traceback …\n  File "/home/me/a.py"\nValueError: no\n'),
             '0.000000007 error /n timer \'tick\' "ValueError: no"',
         ),
+        (
+            Event(0, 'error', '/n', 'on_start', f'{CAUSE}SystemExit: 3\nhelp: a note of it\n'),
+            '0.000000000 error /n on_start "SystemExit: 3"',
+        ),
+        (
+            Event(0, 'log', '/n', 'error', f'a call failed\n{indent(CAUSE, "  ")}  SystemExit: 3'),
+            '0.000000000 log /n error "a call failed\\n  ValueError: no\\n\\n  SystemExit: 3"',
+        ),
+        (Event(0, 'log', '/n', 'info', 'no Traceback\n  of it'), '0.000000000 log /n info "no Traceback\\n  of it"'),
     ],
 )  # fmt: skip
 def test_an_event_is_a_line(event, line):

@@ -22,6 +22,7 @@ from composer.scenarios.reports import render_report
 from composer.scenarios.reports.run_report import RunReport
 from composer.scenarios.reports.text import render_case, render_end
 from composer.scenarios.running.case_client import CaseClient
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,13 +58,15 @@ def run_tests(words: Sequence[str], options: RunOptions) -> int:
         plan = plan_cases(files, is_meant)
         runs = CaseRuns(client, plan.cases, options, Path(folder))
         try:
-            return _run(runs, plan, options, started)
+            return _run(runs, plan, words, options, started)
         except KeyboardInterrupt:
             _report(runs.reports, plan, options, started, 'interrupted')
             raise
 
 
-def _run(runs: CaseRuns, plan: CasePlan, options: RunOptions, started: float) -> int:
+def _run(
+    runs: CaseRuns, plan: CasePlan, words: Sequence[str], options: RunOptions, started: float
+) -> int:
     _show_warnings(plan, options)
     end = ''
     for case in runs.run():
@@ -75,7 +78,7 @@ def _run(runs: CaseRuns, plan: CasePlan, options: RunOptions, started: float) ->
         runs.write_trace(options.trace)
     report = _report(runs.reports, plan, options, started, end)
     if not plan.cases:
-        _explain_nothing(plan)
+        _explain_nothing(plan, words)
         return ExitCode.NOTHING_COLLECTED
     return ExitCode.FAILED if report.has_failed else ExitCode.DONE
 
@@ -117,6 +120,7 @@ def _report(
     return report
 
 
-def _explain_nothing(plan: CasePlan) -> None:
-    what = 'no case has such a name' if plan.deselected else f'no file matches {DEFAULT_PATTERN}'
+def _explain_nothing(plan: CasePlan, words: Sequence[str]) -> None:
+    patterns = ', '.join(words) or DEFAULT_PATTERN
+    what = 'no case has such a name' if plan.deselected else f'no file matches {escape(patterns)}'
     click.echo(what, err=True)

@@ -9,6 +9,7 @@ from composer.scenarios.expectations.diffs import show_value
 from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
 from composer.scenarios.specs import ErrorExpectationSpec, ExitExpectationSpec
+from composer.simulation.trace import error_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,7 +71,7 @@ def _check_count(
     if len(found) > expected.least:
         culprit = found[min(expected.most or 0, len(found) - 1)]
         message += at_time(culprit.time_ns) if len(found) == 1 else ''
-        time, diff = culprit.time_ns, f'+ {_last_line(culprit)}'
+        time, diff = culprit.time_ns, f'+ {_in_one_line(culprit)}'
     yield Failure(expected.path, message, diff, time, names)
 
 
@@ -83,18 +84,23 @@ def check_unexpected_errors(case: CaseSpec, happened: Happenings) -> Iterator[Fa
             _is_meant(each, event) and each.window.has(event.time_ns) for each in expected
         )
         if not is_expected:
-            key = event.node, event.name, _last_line(event)
+            key = event.node, event.name, error_line(str(event.value))
             unexpected.setdefault(key, []).append(event)
     for (node, name, line), events in unexpected.items():
-        more = f', and {len(events) - 1} more times' if len(events) > 1 else ''
+        more = f', and {_times(len(events) - 1)}' if len(events) > 1 else ''
         message = f'{name} of {node} raised {line}{at_time(events[0].time_ns)}{more}'
         lines = str(events[0].value).rstrip().splitlines()
         cut = ['  …', *lines[-_MOST_LINES:]] if len(lines) > _MOST_LINES else lines
         yield Failure(case.path, message, '\n'.join(cut), events[0].time_ns, (node,))
 
 
-def _last_line(event: Event) -> str:
-    return str(event.value).rstrip().rpartition('\n')[2]
+def _in_one_line(event: Event) -> str:
+    text = str(event.value).strip()
+    return error_line(text) if event.kind == 'error' else text.partition('\n')[0]
+
+
+def _times(number: int) -> str:
+    return 'once more' if number == 1 else f'{number} more times'
 
 
 def check_exit(expected: ExitExpectationSpec, happened: Happenings) -> Iterator[Failure]:

@@ -130,7 +130,7 @@ def _render_surroundings(result: CaseResult) -> Iterator[str]:
         yield f'--- {title} ---'
         if len(lines) > _MOST_LINES:
             yield f'({count(len(lines) - _MOST_LINES, "line")} before)'
-        yield from map(escape, lines[-_MOST_LINES:])
+        yield from map(escape_lines, lines[-_MOST_LINES:])
         yield ''
 
 

@@ -73,6 +73,8 @@ def test_options_choose_cases(project, run_json, words, outcomes):
 def test_without_cases_it_ends_as_pytest_does(project, capsys):
     assert run(['test']) == 5
     assert capsys.readouterr().err == 'no file matches tests/**/*.scenario.yaml\n'
+    assert run(['test', 'robots/*.yaml']) == 5
+    assert capsys.readouterr().err == 'no file matches robots/*.yaml\n'
     project.scenario(PASSING)
     assert run(['test', '-k', 'nothing']) == 5
     assert capsys.readouterr().err == 'no case has such a name\n'

@@ -41,6 +41,12 @@ class Scan(Message):
     FIELDS: ClassVar = {'origin': 'example/Vector', 'ranges': 'sequence<float>', 'frame': 'string'}
 
 
+class Status(Message):
+    """As `diagnostic_msgs/msg/DiagnosticStatus`, in short: a `byte` is `bytes` in rclpy."""
+
+    FIELDS: ClassVar = {'level': 'octet', 'flags': 'sequence<octet>'}
+
+
 def number(value):
     return Number(data=value)
 

@@ -70,6 +70,8 @@ def test_the_same_error_is_told_once(said):
     events = [at(time, 'error', "timer 'tick'", TRACEBACK) for time in range(3)]
     ((message, _),) = said({'topic': '/a', 'never': True}, events)
     assert message == "timer 'tick' of /n raised ValueError: too far at 0 s, and 2 more times"
+    ((message, _),) = said({'topic': '/a', 'never': True}, events[1:])
+    assert message == "timer 'tick' of /n raised ValueError: too far at 1 s, and once more"
 
 
 @pytest.mark.parametrize(

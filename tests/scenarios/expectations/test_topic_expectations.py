@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from composer.scenarios.expectations.evaluation import evaluate
 from composer.simulation.events import Event
 from tests.scenarios.expectations.conftest import at, case_of
-from tests.scenarios.expectations.plain_messages import number, scan
+from tests.scenarios.expectations.plain_messages import Status, number, scan
 
 RAMP = [at(time, 'message', '/ramp', number(float(time))) for time in range(6)]
+STATUS = at(6, 'message', '/status', Status(level=b'\x02', flags=[b'\x01', b'\x00']))
 SCANS = [
     at(1, 'message', '/scan', scan(1.0, [0.5])),
     at(2, 'message', '/scan', scan(2.0, [])),
@@ -39,10 +40,13 @@ SCANS = [
         {'topic': '/ramp', 'rate': [1, 1], 'between': [0, 6]},
         {'topic': '/ramp', 'rate': [0.6, 0.6]},
         {'order': [{'topic': '/ramp', 'where': 'data == 1'}, {'topic': '/scan'}, {'topic': '/ramp'}]},
+        {'topic': '/status', 'where': 'level == 2 and flags[0] == 1 and flags | sum < level'},
+        {'topic': '/status', 'never': 'level != 2'},
+        {'topic': '/status', 'message': {'level': 2, 'flags': [1, 0]}},
     ],
 )  # fmt: skip
 def test_what_holds_says_nothing(said, then):
-    events = sorted([*RAMP, *SCANS], key=lambda each: each.time_ns)
+    events = sorted([*RAMP, *SCANS, STATUS], key=lambda each: each.time_ns)
     assert said(then, events) == []
 
 
