@@ -24,6 +24,7 @@ from composer.records import record
 from composer.reports import render_report
 from composer.reports.report import CheckedFile, Report, name_combinations
 from composer.reports.text import count, render_files, summarize
+from composer.scenarios.recognition import SUFFIXES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -109,7 +110,11 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
     if options.types:
         further['types'] = _types_check(options.type_checker)
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
+    scenarios = list(selection.scenarios)
     for selected in selection.systems:
+        if str(selected.path) == '-' and options.stdin_name.endswith(SUFFIXES):
+            scenarios.append(selected.path)
+            continue
         checked = []
         for given, combination, system in _load(selected, options):
             findings = absent.leave_out(check_system(system, catalogue, further))
@@ -117,23 +122,22 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
             nodes = len(system.spec.nodes) if system.spec else None
             checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
         files += name_combinations(checked)
-    files += [
-        _check_scenarios(path, catalogue, absent, options.ignored) for path in selection.scenarios
-    ]
+    files += [_check_scenarios(path, catalogue, absent, options) for path in scenarios]
     unchecked = _list_unchecked(catalogue, imports, absent)
     return Report(tuple(files), unchecked, options.is_strict)
 
 
 def _check_scenarios(
-    path: Path, catalogue: InterfaceCatalogue, absent: AbsentPackages, ignored: Sequence[str]
+    path: Path, catalogue: InterfaceCatalogue, absent: AbsentPackages, options: CheckOptions
 ) -> CheckedFile:
     # Most runs check no scenarios.
     from composer.scenarios.checks import check_scenarios
     from composer.scenarios.scenario_files import load_scenarios
 
-    loaded = load_scenarios(path)
+    path, text = read_standard_input(path, options.stdin_name)
+    loaded = load_scenarios(path, text=text)
     findings = absent.leave_out(check_scenarios(loaded, catalogue))
-    kept = tuple(finding for finding in findings if finding.rule not in ignored)
+    kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
     return CheckedFile(str(path), kept, cases=len(loaded.spec.cases) if loaded.spec else None)
 
 
