@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.language.pipeline import load_system
+from composer.language.values.start_reader import StartValueReader
 from composer.records import record
 from composer.scenarios.running.case_run import run_case
 from composer.scenarios.running.warm_up import load_type_supports
@@ -53,6 +55,7 @@ def prepare_file(name: str) -> PreparedFile:
         ComposerError: The file cannot be read.
     """
     loaded = load_scenarios(Path(name))
+    _read_start_values(loaded)
     system = loaded.system
     if system is not None and system.spec is not None:
         types = (end.type for node in system.spec.end_owners() for _, end in node.ends())
@@ -62,3 +65,21 @@ def prepare_file(name: str) -> PreparedFile:
                 importlib.import_module(module)
         load_type_supports()
     return PreparedFile(loaded)
+
+
+def _read_start_values(loaded: LoadedScenarios) -> None:
+    """Read the values that are known when a system starts, once for all cases of a file.
+
+    Raises:
+        StartValueError: One cannot be read.
+    """
+    if loaded.system is None or loaded.spec is None or not loaded.system.start.found:
+        return
+    reference = loaded.spec.system
+    loaded.system = load_system(
+        reference.file,
+        reference.words,
+        layers=reference.layers,
+        set_values=reference.set_values,
+        read_value=StartValueReader().read,
+    )
