@@ -26,6 +26,19 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 
+# Those whose time is virtual now.
+_running: list[SimulatedThreads] = []
+
+
+def _leave_in_child() -> None:
+    """Let a forked process have real time: the threads that it would wait for are not in it."""
+    for threads in _running:
+        threads.by_ident.clear()
+
+
+os.register_at_fork(after_in_child=_leave_in_child)
+
+
 @contextmanager
 def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterator[Watch]:
     """Let the simulated threads wait in virtual time, and have its clocks, meanwhile.
@@ -39,6 +52,8 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
     """
     watch = Watch(threads)
     with ExitStack() as stack:
+        _running.append(threads)
+        stack.callback(_running.remove, threads)
         stack.callback(begin(watch))
         for each in (
             clocks(threads, start_time_ns),

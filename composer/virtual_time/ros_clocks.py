@@ -8,12 +8,13 @@ clocks read the time in C; they are asked here instead.
 from __future__ import annotations
 
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import rclpy.node
 import rclpy.timer
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
 from composer.virtual_time.clocks import MONOTONIC_START_NS
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
     from rclpy.duration import Duration
 
     from composer.virtual_time.simulated_threads import SimulatedThreads
+
+# How long at most a plain executor does not look.
+_STEP_NS: Final = 10_000_000
+_WAITED_FOR: Final = ('subscription', 'guard_condition', 'timer', 'client', 'service')
 
 
 class SimulatedClock(ROSClock):
@@ -104,7 +109,24 @@ def _replacements(
         used = clock if threads.mine() is None else simulated
         create_timer(self, callback, group, period_ns, used, **options)
 
+    wait_set: Any = _rclpy.WaitSet
+    yield wait_set, 'wait', _waits_in_steps(threads, wait_set.wait)
     yield rclpy.node, 'ROSClock', create_ros_clock
     yield Clock, 'now', now_virtually
     yield Clock, 'sleep_until', sleep_virtually
     yield rclpy.timer.Timer, '__init__', create_timer_on
+
+
+def _waits_in_steps(threads: SimulatedThreads, wait: Any) -> Callable[..., None]:
+    """Return what a plain executor of a behaviour waits with, again and again."""
+
+    def wait_in_steps(self: Any, timeout_ns: Any) -> None:
+        if threads.mine() is None or timeout_ns == 0:
+            wait(self, timeout_ns)
+            return
+        wait(self, 0)
+        # It forgets what is not ready. Those who use it make a new one when nothing is.
+        if not any(map(self.get_ready_entities, _WAITED_FOR)):
+            threads.sleep(_STEP_NS if timeout_ns < 0 else min(timeout_ns, _STEP_NS))
+
+    return wait_in_steps

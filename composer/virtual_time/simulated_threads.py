@@ -366,7 +366,7 @@ class SimulatedThreads:
             REAL.acquire(me.turn)
             return
         seen, since = (self.turns, self.now_ns), (REAL.monotonic(), 0.0)
-        while not REAL.acquire(me.turn, True, _LOOK_SEC):
+        while not self._comes_back(me):
             now = REAL.monotonic(), _work_of(self.current)
             if (self.turns, self.now_ns) != seen:
                 seen, since = (self.turns, self.now_ns), now
@@ -376,6 +376,17 @@ class SimulatedThreads:
                 if stuck is not None:
                     stuck.is_ending = True
                 raise SimulationStuckError(stuck.ident if stuck else 0, self.limit_sec)
+
+    def _comes_back(self, me: SimulatedThread) -> bool:
+        """Return whether it is the turn of the thread from outside, after a short wait."""
+        try:
+            return bool(REAL.acquire(me.turn, True, _LOOK_SEC))
+        except BaseException as error:
+            # A signal handler raised it: its turn comes when another thread waits.
+            if self.current is me:
+                raise
+            self._tell(error)
+            return False
 
     def _is_too_long(self, real_sec: float, work_sec: float) -> bool:
         """Tell whether a thread that has not waited for so long is stuck.

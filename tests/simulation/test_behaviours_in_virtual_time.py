@@ -241,6 +241,26 @@ CASES = {
         """,
         [(1.75, 'f')],
     ),
+    'plain executors of a behaviour': (
+        'n: {on_start: "parts:begin"}',
+        """
+        from rclpy.executors import SingleThreadedExecutor
+
+        def begin(node):
+            context = node.ros.context
+            other = rclpy.create_node('other', context=context)
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(other)
+            other.create_timer(0.5, lambda: node.logger.info('tick'))
+            executor.spin_once(timeout_sec=0.25)
+            node.logger.info('once')
+            executor.spin_until_future_complete(rclpy.task.Future(), timeout_sec=1.0)
+            node.logger.info('twice')
+            executor.shutdown()
+            other.destroy_node()
+        """,
+        [(0.25, 'once'), (0.5, 'tick'), (1.0, 'tick'), (1.25, 'twice')],
+    ),
     'parallel callbacks': (
         """
         n:

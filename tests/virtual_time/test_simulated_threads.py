@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composer.virtual_time.originals import REAL
 from composer.virtual_time.simulated_threads import NothingHappensError, SimulationStuckError
 from tests.virtual_time.virtual_runs import virtual_time
 
@@ -126,6 +127,28 @@ def test_a_deadlock_ends():
         time.sleep(0.5)
         with pytest.raises(NothingHappensError):
             second.acquire()
+
+
+def test_an_interrupt_waits_for_the_next_turn():
+    """Else the thread that runs would go on beside the one from outside."""
+    seen = []
+
+    def work():
+        _thread.interrupt_main()
+        for _ in range(200):
+            REAL.sleep(0.001)
+        seen.append('waits')
+        time.sleep(1)
+        seen.append('ends')
+
+    with virtual_time() as threads:
+        thread = threading.Thread(target=work)
+        with pytest.raises(KeyboardInterrupt):
+            _start_and_wait(thread)
+        assert seen == ['waits']
+        assert threads.now_ns == 0
+        time.sleep(2)
+        assert seen == ['waits', 'ends']
 
 
 def _loop_without_end():
@@ -293,6 +316,18 @@ def test_many_simulations_follow_each_other():
             ended.wait()
             assert threads.now_ns == 100_000_000_000
     assert threading.active_count() == before
+
+
+def test_a_forked_process_has_real_time():
+    with virtual_time():
+        thread = threading.Thread(target=_sleeps_long)
+        thread.start()
+        process = os.fork()
+        if process == 0:
+            begun = time.monotonic()
+            time.sleep(0.1)
+            os._exit(0 if 0.1 <= time.monotonic() - begun < 10 else 1)
+        assert os.waitpid(process, 0)[1] == 0
 
 
 def test_chance_is_the_seed():
