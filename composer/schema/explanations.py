@@ -30,11 +30,15 @@ _SEPARATORS = re.compile(r'[/.:]+')
 
 # What launch files and other tools call the keys; the values may have other forms.
 _OTHER_WORDS = {
+    'action': ('send_goal',),
     'args': ('arguments', 'with'),
     'callback': ('behaviour',),
     'cmd': ('command',),
+    'contains': ('text',),
     'depends_on': ('wait_for',),
+    'duration': ('until',),
     'environment': ('env',),
+    'equals': ('message',),
     'exec': ('executable',),
     'exec_name': ('name',),
     'freq': ('rate',),
@@ -45,15 +49,19 @@ _OTHER_WORDS = {
     'min': ('minimum',),
     'msg': ('message',),
     'ns': ('namespace',),
-    'params': ('parameters',),
+    'params': ('parameters', 'set_parameters'),
     'params_file': ('parameter_files',),
     'pkg': ('package',),
+    'pattern': ('matches',),
     'plugin': ('behaviour',),
     'queue': ('depth',),
+    'regex': ('matches',),
     'remappings': ('remap',),
     'required': ('on_exit',),
     'respawn': ('restart',),
     'respawn_delay': ('restart',),
+    'service': ('call',),
+    'time': ('at',),
     'unless': ('when',),
     'if': ('when',),
     'working_dir': ('cwd',),
@@ -242,7 +250,8 @@ def _is_mismatch(inner: ValidationError, outer: ValidationError) -> bool:
 
 def _describe_mismatch(error: ValidationError) -> str:
     if error.validator == 'const':
-        return repr(error.validator_value)
+        value = error.validator_value
+        return show_value(value) if isinstance(value, bool) else repr(value)
     if error.validator == 'oneOf':
         return ' or '.join(_describe_mismatch(inner) for inner in error.context or ())
     return describe_types(error.validator_value)

@@ -324,7 +324,7 @@ def test_a_comment_silences_what_an_import_shows(run, tmp_path):
 
 
 def test_without_ros_an_import_says_what_it_could_not_check(imports, monkeypatch):
-    from composer.cli.common import import_check as importing
+    from composer.runtime.behaviours import import_check as importing
 
     find = importing.importlib.util.find_spec
     monkeypatch.setattr(

@@ -179,6 +179,8 @@ cases:
          "'/a b'"),
         ('when: [{at: -1, publish: /a}]\n    then: []', '6:17 out-of-range: expected at least 0, got -1'),
         ('when: [{at: 1, publish: /a, times: 3}]\n    then: []', "6:33 missing-key: 'times' requires 'every'"),
+        ('then: [{topic: /a, never: false}]', '6:31 wrong-type: expected true or a string, got false'),
+        ('then: [{log: a, regex: b}]', "6:21 unknown-key: unknown key 'regex' in expectation (did you mean 'matches'?)"),
         ('given: {}', "4:3 missing-key: the key 'then' is missing in case 'one'"),
     ],
 )  # fmt: skip

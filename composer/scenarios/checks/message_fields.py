@@ -141,6 +141,10 @@ def check_condition(
     code = value_at(context, path)
     if not isinstance(code, str):
         return
+    if _OPEN in code:
+        help_text = 'the whole text is the expression'
+        yield context.at_value(path, 'bad-expression', 'write it without braces', help=help_text)
+        return
     # The import of jinja2 takes a tenth of the time of a check.
     from composer.checks.behaviours.message_expressions import evaluate_over
 

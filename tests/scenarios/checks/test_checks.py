@@ -97,6 +97,8 @@ WRONG = [
      "linaer undefined-name: 'linaer' is not defined (did you mean 'linear'?)"),
     ({'then': '{topic: /speed, eventually: "linear.x >"}'},
      '"linear.x >" bad-expression: unexpected \'end of template\''),
+    ({'then': '{topic: /speed, where: "{{ linear.x }}"}'}, '"{{ linear.x }}" bad-expression: '
+     'write it without braces (the whole text is the expression)'),
     ({'then': '{order: [{topic: /speed, where: "linear.x > 0"}, {topic: /speed, where: "x"}]}'},
      "x undefined-name: 'x' is not defined (in scope are: angular, linear, message)"),
     ({'given': '{services: {/dock: {response: {message: "{{ requst.data }}"}}}}'},
