@@ -9,11 +9,12 @@ from contextlib import ExitStack
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.plugin import PLUGINS
 from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
 
-# Runs pytest within tests, for the plugin.
-pytest_plugins = ('pytester',)
+# The scenarios of the shipped systems are tests, too; `pytester` runs pytest within tests.
+pytest_plugins = ('pytester', *PLUGINS)
 
 # What hypothesis tries is the same in each run, and no test fails for the time that it takes.
 settings.register_profile(

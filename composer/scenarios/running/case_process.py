@@ -26,6 +26,10 @@ _PR_SET_PDEATHSIG = 1
 _GRACE_SEC = 5.0
 # Of longer output, the end is kept.
 _LONGEST_OUTPUT = 200_000
+# The innermost call of a thread that waits for its turn, as faulthandler shows it.
+_WAITING = re.compile(
+    r'recent call first\):\n  File "[^"]*simulated_threads\.py", line \d+ in _park'
+)
 _TIMEOUT = re.compile(r'^Timeout \(.*\)!\n', re.MULTILINE)
 
 _prctl = ctypes.CDLL(None).prctl
@@ -91,7 +95,7 @@ class CaseProcess:
             result = pickle.load(self._result)  # noqa: S301 - our own
             if isinstance(result, CaseResult):
                 return result
-        stack = _read_end(self._stack)
+        stack = _without_waits(_read_end(self._stack))
         if _TIMEOUT.search(stack) or monotonic() > self.kill_at:
             message = f'it took longer than {self._limit_sec:g} s of real time'
             stack = _TIMEOUT.sub('', stack)
@@ -153,6 +157,13 @@ def _read_end(file: IO[bytes]) -> str:
     file.seek(max(0, size - _LONGEST_OUTPUT))
     text = file.read().decode(errors='replace')
     return text if size <= _LONGEST_OUTPUT else f'…{text}'
+
+
+def _without_waits(stacks: str) -> str:
+    """Return the stacks without those of threads that wait for their turns."""
+    parts = stacks.split('\n\n')
+    busy = [part for part in parts if not _WAITING.search(part)]
+    return '\n\n'.join(busy if any('File "' in part for part in busy) else parts)
 
 
 def _explain_end(code: int) -> str:

@@ -9,6 +9,7 @@ import gc
 import importlib
 import inspect
 import sys
+from contextlib import suppress
 
 # What the first node of a process imports, and what runs a system.
 _MODULES = (
@@ -25,7 +26,7 @@ _MODULES = (
     'rcl_interfaces.srv',
     'rosgraph_msgs.msg',
     'type_description_interfaces.srv',
-    'composer.scenarios.running.case_run',
+    'composer.scenarios.running.prepared_case',
 )
 _OF_INTERFACES = ('msg', 'srv', 'action')
 
@@ -33,7 +34,9 @@ _OF_INTERFACES = ('msg', 'srv', 'action')
 def warm_up() -> None:
     """Import what every case needs."""
     for name in _MODULES:
-        importlib.import_module(name)
+        # Not every version of ROS has all of them.
+        with suppress(ModuleNotFoundError):
+            importlib.import_module(name)
     # Loads the middleware.
     from rclpy.utilities import get_rmw_implementation_identifier
 
