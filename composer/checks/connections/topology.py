@@ -59,8 +59,16 @@ _PARTS_OF_ACTIONS: dict[tuple[ChannelKind, str], str] = {
     ('service', 'get_result'): '{}_GetResult',
     ('service', 'cancel_goal'): 'action_msgs/srv/CancelGoal',
 }
-# By the keys of a node that switch them on (rclpy's `ParameterService` and the like), with types.
+# By the keys of a node that switch them on, with types (rclpy's `LifecycleNodeMixin`,
+# `ParameterService` and the like).
 _SERVICES_OF_ROS = {
+    'lifecycle': {
+        'change_state': 'lifecycle_msgs/srv/ChangeState',
+        'get_available_states': 'lifecycle_msgs/srv/GetAvailableStates',
+        'get_available_transitions': 'lifecycle_msgs/srv/GetAvailableTransitions',
+        'get_state': 'lifecycle_msgs/srv/GetState',
+        'get_transition_graph': 'lifecycle_msgs/srv/GetAvailableTransitions',
+    },
     'parameter_services': {
         'describe_parameters': 'rcl_interfaces/srv/DescribeParameters',
         'get_parameter_types': 'rcl_interfaces/srv/GetParameterTypes',

@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from composer.scenarios.specs import ScenarioSpec
     from composer.yaml_text.positions import DataPath
 
-# What each node with a lifecycle serves (rclpy's `LifecycleNodeMixin`).
-_LIFECYCLE_SERVICES = {
-    'change_state': 'lifecycle_msgs/srv/ChangeState',
-    'get_available_states': 'lifecycle_msgs/srv/GetAvailableStates',
-    'get_available_transitions': 'lifecycle_msgs/srv/GetAvailableTransitions',
-    'get_state': 'lifecycle_msgs/srv/GetState',
-    'get_transition_graph': 'lifecycle_msgs/srv/GetAvailableTransitions',
-}
-
 
 @record
 class ScenarioContext:
@@ -71,9 +62,7 @@ class ScenarioContext:
 
     def is_of_ros(self, kind: ChannelKind, name: str) -> bool:
         """Return whether ROS itself publishes a topic, or serves a service."""
-        channel = Channel(kind, name)
-        topology = self.system.topology
-        return topology.type_of_ros(channel) is not None or self._lifecycle_type(name) is not None
+        return self.system.topology.type_of_ros(Channel(kind, name)) is not None
 
     def type_of(self, kind: ChannelKind, name: str) -> str | None:
         """Return the type of a topic, service or action; `None` if the system does not tell it."""
@@ -81,13 +70,7 @@ class ScenarioContext:
         for end in channel.ends if channel else ():
             if self.system.has_real_type(end.entity):
                 return end.entity.type
-        known = self.system.topology.type_of_ros(Channel(kind, name))
-        return known or (self._lifecycle_type(name) if kind == 'service' else None)
-
-    def _lifecycle_type(self, name: str) -> str | None:
-        owner, _, service = name.rpartition('/')
-        node = self.node(owner)
-        return None if node is None or node.lifecycle is None else _LIFECYCLE_SERVICES.get(service)
+        return self.system.topology.type_of_ros(Channel(kind, name))
 
     def describe(self, type_name: str | None) -> InterfaceDescription | None:
         """Describe a type; `None` if it is not known."""

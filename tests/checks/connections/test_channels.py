@@ -95,6 +95,11 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
     assert check(elsewhere, CODE, installed=False) == [(11, 'no-server')]
     without = nodes.replace('b: {}', 'b: {parameter_services: false}')
     assert check(without, CODE, installed=False) == [(11, 'no-server')]
+    change = nodes.replace('get_parameters', 'change_state')
+    change = change.replace('rcl_interfaces/srv/GetParameters', 'lifecycle_msgs/srv/ChangeState')
+    assert check(change, CODE, installed=False) == [(11, 'no-server')]
+    managed = change.replace('b: {}', 'b: {lifecycle: true}')
+    assert check(managed, CODE, installed=False) == []
 
 
 @pytest.mark.parametrize(
@@ -113,6 +118,8 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
         ('service_clients', '/b/list_parameters', 'rcl_interfaces/srv/ListParameters'),
         ('service_clients', '/c/list_parameters', 'any/srv/Type'),
         ('service_clients', '/c/get_logger_levels', 'rcl_interfaces/srv/GetLoggerLevels'),
+        ('service_clients', '/c/change_state', 'lifecycle_msgs/srv/ChangeState'),
+        ('service_clients', '/b/change_state', 'any/srv/Type'),
     ],
 )
 def test_what_ros_has_itself_has_the_types_of_ros(check, section, name, right):
@@ -125,7 +132,7 @@ def test_what_ros_has_itself_has_the_types_of_ros(check, section, name, right):
       it: {{type: TYPE, {key}: {name}, external: true{more}}}
     on_start: parts:use
   b: {{actions: {{/act: {{type: test_msgs/action/Fibonacci, behaviour: parts:do}}}}}}
-  c: {{parameter_services: false, logger_services: true}}
+  c: {{parameter_services: false, logger_services: true, lifecycle: true}}
 """
     code = (
         CODE
