@@ -44,7 +44,13 @@ _END_SEC: Final = 5.0
 
 
 class OwnPublishers(Protocol):
-    """The publishers whose messages are recorded where they are published."""
+    """The publishers whose messages are recorded where they are published.
+
+    Attributes:
+        may_be_late: Whether the graph may know one of them before these do.
+    """
+
+    may_be_late: bool
 
     def count(self, topic: str) -> int:
         """Return how many of them a topic has."""
@@ -60,6 +66,8 @@ class OwnPublishers(Protocol):
 
 
 class _NoPublishers:
+    may_be_late = False
+
     def count(self, topic: str) -> int:  # noqa: ARG002 - as in `OwnPublishers`
         return 0
 
@@ -118,6 +126,8 @@ class GraphRecorder:
         self.topics: set[str] = set()
         self._listeners: dict[int, _Listener] = {}
         self._heard: set[tuple[str, str]] = set()
+        # What seemed to have publishers of others at the last look.
+        self._suspected: set[str] = set()
         self._taker = MessageTaker()
         self._poll = select.poll()
         self._ended = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -169,14 +179,18 @@ class GraphRecorder:
             if not self._patterns.has(topic):
                 continue
             new = [each for each in types if (topic, each) not in self._heard]
-            if new and self._node.count_publishers(topic) > self._own.count(topic):
+            if not new or self._node.count_publishers(topic) <= self._own.count(topic):
+                self._suspected.discard(topic)
+            elif self._own.may_be_late and topic not in self._suspected:
+                self._suspected.add(topic)
+            else:
                 yield from ((topic, each) for each in new)
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         ends = [
             each
             for each in self._node.get_publishers_info_by_topic(topic)
-            if each.topic_type == type_name
+            if each.topic_type == type_name and not self._own.has(bytes(each.endpoint_gid))
         ]
         if not ends:
             return

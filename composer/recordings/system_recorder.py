@@ -123,6 +123,8 @@ def create_tap(
 class _OwnPublishers:
     """See `OwnPublishers`."""
 
+    may_be_late = True
+
     def __init__(self, topics: LocalTopics) -> None:
         self._topics = topics
         self.publishers: set[bytes] = set()

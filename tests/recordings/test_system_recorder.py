@@ -197,13 +197,9 @@ def test_a_killed_system_leaves_what_it_had_written(compose, tmp_path, wait_for)
 def test_a_full_disk_ends_the_recording_and_not_the_system(compose, tmp_path, wait_for):
     code = CODE.replace("f'own {node.state.number}'", "f'own {node.state.number} ' + 'x' * 10000")
     path = compose.write(SYSTEM, code)
+    child = compose.run(path, '--record', 'run.mcap')
     # A limit for files does what a full disk does, and needs no disk.
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000_000, limits[1]))
-    try:
-        child = compose.run(path, '--record', 'run.mcap')
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    resource.prlimit(child.pid, resource.RLIMIT_FSIZE, (5_000_000, 5_000_000))
     line = child.wait_for_line('the recording has ended')
     assert line == (
         "[ERROR] [composer]: the recording has ended: 'run.mcap' cannot be written: "
