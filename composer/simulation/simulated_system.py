@@ -23,7 +23,7 @@ from composer.runtime.environment import environment_set
 from composer.runtime.rewiring.reading import Reading
 from composer.simulation.events import Event
 from composer.simulation.missed_deadlines import MissedDeadlines
-from composer.simulation.project_modules import forgotten_modules
+from composer.simulation.project_modules import forgotten_modules, list_project_modules
 from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
 from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
 from composer.virtual_time.clocks import to_ns
@@ -184,8 +184,11 @@ class SimulatedSystem:
         self._stack.enter_context(environment_set({**variables, **_ALONE}))
         folders = project_search_path(self._system.files)
         self._stack.enter_context(project_on_path(folders))
-        self._stack.enter_context(forgotten_modules(folders))
+        before = self._stack.enter_context(forgotten_modules(folders))
         functions, _findings = import_behaviours(context)
+        if self._watch is not None:
+            for path in list_project_modules(folders, before).values():
+                self._watch.note_numpy_clocks(path)
         snapshot = take_snapshot(context, prefixes)
         driver = load_system_text(_DRIVER_FILE).spec
         spec = without_processes(snapshot.spec, driver.nodes if driver else {})

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import heapq
 import itertools
+import logging
 import time
 from collections import deque
 from contextlib import contextmanager
@@ -112,6 +113,10 @@ class _Call:
     def __init__(self, function: Callable[[], None]) -> None:
         self.function = function
         self.is_over = False
+
+
+def _refuse(_record: object) -> bool:
+    return False
 
 
 class SimulatedThreads:
@@ -295,15 +300,21 @@ class SimulatedThreads:
     def close(self) -> None:
         """End all threads that wait, where they wait; for the thread that has entered."""
         self._is_closing = True
-        self._end_all()
-        for _ in range(_MOST_ROUNDS):
-            self._look()
-            if not self._ready:
-                self._end_all()
-            if not self._ready:
-                break
-            self._let_others_end()
-        self._end_stuck()
+        # The threads of its pools log that they end.
+        pools = logging.getLogger('concurrent.futures')
+        pools.addFilter(_refuse)
+        try:
+            self._end_all()
+            for _ in range(_MOST_ROUNDS):
+                self._look()
+                if not self._ready:
+                    self._end_all()
+                if not self._ready:
+                    break
+                self._let_others_end()
+            self._end_stuck()
+        finally:
+            pools.removeFilter(_refuse)
 
     def _end_stuck(self) -> None:
         """End the thread that was given up, at its next line of Python."""

@@ -6,6 +6,7 @@ read as they are. Source: https://docs.python.org/3/library/audit_events.html
 
 from __future__ import annotations
 
+import ast
 import os
 import socket
 import sys
@@ -27,7 +28,16 @@ _PACKAGE = str(Path(__file__).resolve().parents[1])
 THREAD: Final = 'starts a thread of its own, whose turns come only where others wait'
 _PROCESS = 'starts a process, which takes real time'
 _SOCKET = 'uses a socket: what others send comes in real time'
+_C_FUNCTION: Final = 'ctypes.dlsym'
+_C_CLOCKS: Final = (
+    *('clock_gettime', 'gettimeofday', 'time', 'ftime', 'timespec_get', 'clock'),
+    *('nanosleep', 'clock_nanosleep', 'usleep', 'sleep'),
+)
+_C_CLOCK: Final = 'reads a clock in C, or sleeps there: that is real time'
+# What numpy takes for the time of its own clock.
+_NOW: Final = ('now', 'today')
 _EVENTS: Final = {
+    _C_FUNCTION: _C_CLOCK,
     'socket.connect': _SOCKET,
     'socket.bind': _SOCKET,
     'socket.sendto': _SOCKET,
@@ -78,6 +88,8 @@ class Watch:
         what = _EVENTS.get(event)
         if what is None or self._threads.mine() is None:
             return
+        if event == _C_FUNCTION and arguments[1] not in _C_CLOCKS:
+            return
         if what is _SOCKET and getattr(arguments[0], 'family', None) == socket.AF_UNIX:
             return
         self.note(what)
@@ -87,6 +99,17 @@ class Watch:
         frame = _user_frame()
         if frame is not None:
             self.notices[Notice(what, frame.f_code.co_filename, frame.f_lineno)] = None
+
+    def note_numpy_clocks(self, path: Path) -> None:
+        """Note where a module of a project asks numpy for the time, which reads it in C."""
+        source = path.read_bytes() if path.suffix == '.py' else b''
+        if b'datetime64' not in source:
+            return
+        for each in ast.walk(ast.parse(source)):
+            if isinstance(each, ast.Call) and ast.unparse(each.func).endswith('datetime64'):
+                first = each.args[0] if each.args else None
+                if isinstance(first, ast.Constant) and first.value in _NOW:
+                    self.notices[Notice(_C_CLOCK, str(path), each.lineno)] = None
 
     def counters(self) -> Iterator[tuple[ReplacedFunction, Callable[..., Any]]]:
         """Yield clocks that count work, and what notes that they are read."""

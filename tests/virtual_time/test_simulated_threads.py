@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 import traceback
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
@@ -297,6 +298,13 @@ def test_no_thread_is_left_at_the_end(function, seed):
         thread.join(5)
         assert not thread.is_alive()
     assert time.monotonic() - begun < 5
+
+
+def test_nobody_hears_of_the_end_of_a_pool(caplog):
+    with virtual_time():
+        pool = ThreadPoolExecutor(2)
+        assert pool.submit(abs, -1).result() == 1
+    assert caplog.records == []
 
 
 def test_one_that_has_not_begun_never_does():
