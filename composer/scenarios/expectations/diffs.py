@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from composer.simulation.trace import render_value
@@ -14,23 +14,31 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath, Key
 
 _MOST_SHOWN = 12
+_MOST_ITEMS = 3
 _LONGEST_VALUE = 72
 
 
 def render_differences(differences: Iterable[Difference]) -> str:
     """Return differences as lines: `-` is expected, `+` is what was there.
 
-    The first dozen are shown. A value that is long is cut in its middle.
+    The first dozen are shown; of an array, the first three. A value that is long is cut in its
+    middle.
     """
-    iterator = iter(differences)
     lines: list[str] = []
     last: DataPath = ()
-    for each in islice(iterator, _MOST_SHOWN):
-        lines += _headings(last, each.path[:-1])
-        lines += _sides(each)
-        last = each.path[:-1]
-    more = sum(1 for _ in iterator)
-    lines += [f'  … and {more} more'] if more else []
+    shown = 0
+    for parent, group in groupby(differences, lambda each: each.path[:-1]):
+        found = list(group)
+        is_array = bool(found[0].path) and isinstance(found[0].path[-1], int)
+        most = min(_MOST_ITEMS if is_array else _MOST_SHOWN, _MOST_SHOWN - shown)
+        if most <= 0:
+            return '\n'.join([*lines, '  …'])
+        lines += _headings(last, parent)
+        lines += [line for each in found[:most] for line in _sides(each)]
+        more = len(found) - most
+        lines += [f'  {"  " * len(parent)}… and {more} more'] if more > 0 else []
+        shown += min(len(found), most)
+        last = parent
     return '\n'.join(lines)
 
 

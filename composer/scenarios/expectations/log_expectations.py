@@ -88,7 +88,8 @@ def check_unexpected_errors(case: CaseSpec, happened: Happenings) -> Iterator[Fa
             unexpected.setdefault(key, []).append(event)
     for (node, name, line), events in unexpected.items():
         more = f', and {_times(len(events) - 1)}' if len(events) > 1 else ''
-        message = f'{name} of {node} raised {line}{at_time(events[0].time_ns)}{more}'
+        owner = f'{name} of {node}' if node else name
+        message = f'{owner} raised {line}{at_time(events[0].time_ns)}{more}'
         lines = str(events[0].value).rstrip().splitlines()
         cut = ['  …', *lines[-_MOST_LINES:]] if len(lines) > _MOST_LINES else lines
         yield Failure(case.path, message, '\n'.join(cut), events[0].time_ns, (node,))

@@ -74,8 +74,23 @@ def test_only_what_differs_is_told(expected, actual, lines):
 def test_only_the_first_differences_of_an_array_are_told():
     lines = diff({'ranges': [1] * 100}, scan(ranges=[2] * 100)).splitlines()
     assert lines[:3] == ['  ranges:', '-   [0]: 1', '+   [0]: 2.0']
-    assert lines[-1] == '  … and 88 more'
-    assert len(lines) == 26
+    assert lines[-1] == '    … and 97 more'
+    assert len(lines) == 8
+
+
+def test_an_array_hides_no_other_difference():
+    expected = {'origin': {'x': 1, 'y': 1}, 'ranges': [1] * 100, 'frame': 'base'}
+    assert diff(expected, scan(ranges=[2] * 100)).splitlines() == [
+        '  origin:', '-   x: 1', '+   x: 0.0', '-   y: 1', '+   y: 0.0',
+        '  ranges:', '-   [0]: 1', '+   [0]: 2.0', '-   [1]: 1', '+   [1]: 2.0',
+        '-   [2]: 1', '+   [2]: 2.0', '    … and 97 more', '- frame: "base"', '+ frame: "laser"',
+    ]  # fmt: skip
+
+
+def test_no_more_than_a_dozen_differences_are_told():
+    lines = diff({f'{index}': index for index in range(20)}, {}).splitlines()
+    assert len(lines) == 25
+    assert lines[-1] == '  … and 8 more'
 
 
 def test_a_long_value_is_cut():
