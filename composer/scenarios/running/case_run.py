@@ -21,7 +21,7 @@ from composer.scenarios.running.failure_reports import (
     list_log,
 )
 from composer.scenarios.running.recording_input import RecordingInput
-from composer.scenarios.running.stand_in_servers import is_of_stand_in, serve_stand_ins
+from composer.scenarios.running.stand_in_servers import StandIns, is_of_stand_in
 from composer.scenarios.specs import ParametersExpectationSpec
 from composer.scenarios.times import NANOSECONDS
 from composer.simulation.events import Event
@@ -67,7 +67,7 @@ def run_case(loaded: LoadedScenarios, case: CaseSpec, request: CaseRequest) -> C
         seed=seed,
         simulated_sec=round(run.simulated_sec, 9),
         notices=tuple(map(_describe_notice, simulated.notices)),
-        log=tuple(list_log(simulated.events)),
+        log=tuple(list_log(each for each in simulated.events if not is_of_stand_in(each))),
     )
 
 
@@ -94,6 +94,8 @@ class _CaseRun:
             real_limit_sec=_SHARE * (request.real_time_limit_sec or case.real_time_limit_sec),
             shows_log=not request.captures,
         )
+        stop_sec = loaded.system.spec.shutdown_timeout_sec if loaded.system.spec else 0.0
+        self.stand_ins = StandIns(self.simulated, given, stop_sec)
         self.steps = CaseSteps(self.simulated, loaded, case)
         self._input = (
             RecordingInput(self.simulated, recording, loaded.system) if recording else None
@@ -103,7 +105,7 @@ class _CaseRun:
         """Let it all happen; return what went wrong beside expectations that are not met."""
         simulated, case = self.simulated, self._case
         try:
-            serve_stand_ins(simulated, case.given)
+            self.stand_ins.serve()
             self.steps.schedule()
             if self._input:
                 self._input.schedule()
@@ -124,6 +126,7 @@ class _CaseRun:
             time_ns = round(simulated.now * NANOSECONDS)
             simulated.events.append(Event(time_ns, 'exit', '', '', simulated.exit_code))
         number = len(simulated.events)
+        self.stand_ins.end()
         simulated.stop()
         happened = [each for each in simulated.events if not is_of_stand_in(each)]
         at_stop = simulated.events[number:]
