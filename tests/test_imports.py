@@ -58,6 +58,7 @@ SHARED_NAMES = {
     'qos.py',  # profiles and policies, and their checks
     'evaluation.py',  # of expressions, and of expectations
     'specs.py',  # the records that a file is parsed into
+    'project_modules.py',  # as type checkers see them, and as simulations forget them
     'reading.py',  # what was read: of a behaviour, and of a system
     'github.py',  # a form of reports: of findings, and of test runs
     'junit.py',  # the same

@@ -40,6 +40,7 @@ NO_RULES = {
     'site-packages',
     'dist-packages',
     'system-out',
+    'system-err',
 }
 # Names of which the code has one half, and a table the other.
 COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
