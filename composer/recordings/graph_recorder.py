@@ -10,6 +10,7 @@ from time import monotonic, thread_time, time_ns
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -161,7 +162,10 @@ class GraphRecorder:
                     os.eventfd_read(event)
                 self._take_all(self._listeners[event])
             if monotonic() >= next_look:
-                next_look = monotonic() + self._look()
+                next_look = monotonic() + _LONGEST_PAUSE_SEC
+                # A behaviour may have shut down what all use; the system ends then.
+                with suppress(InvalidHandle, _rclpy.RCLError):
+                    next_look = monotonic() + self._look()
 
     def _look(self) -> float:
         """Subscribe to the topics that have come; return when to look again, in seconds."""
