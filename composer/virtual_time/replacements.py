@@ -11,8 +11,9 @@ import random
 import select
 import sys
 import threading
+import uuid
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from composer.virtual_time.blocking_calls import blocking_calls, virtual_select
 from composer.virtual_time.clocks import clocks
@@ -26,6 +27,12 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 
+# Without C's generator `uuid1` reads Python's clock; and a network card that no machine has.
+_UUID1: Final = (
+    (uuid, '_generate_time_safe', None),
+    (uuid, '_last_timestamp', None),
+    (uuid, '_node', 0x0242AC110002),
+)
 # Those whose time is virtual now.
 _running: list[SimulatedThreads] = []
 
@@ -66,10 +73,11 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
                 stack.callback(target.restore)
         # These Python itself looks up at each call.
         methods = thread_methods(threads, lambda: watch.note(THREAD))
-        attributes = [(threading.Thread, *each) for each in methods]
-        for owner, name, function in (*attributes, (select, 'select', virtual_select(threads))):
+        attributes: list[tuple[Any, str, Any]] = [(threading.Thread, *each) for each in methods]
+        attributes += [(select, 'select', virtual_select(threads)), *_UUID1]
+        for owner, name, value in attributes:
             stack.callback(setattr, owner, name, getattr(owner, name))
-            setattr(owner, name, function)
+            setattr(owner, name, value)
         stack.enter_context(_seeded(seed))
         yield watch
 

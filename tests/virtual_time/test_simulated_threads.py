@@ -344,6 +344,8 @@ def test_chance_is_the_seed():
             import secrets
             import uuid
 
-            return random.random(), os.urandom(4), uuid.uuid4(), secrets.token_hex()
+            return random.random(), os.urandom(4), uuid.uuid4(), secrets.token_hex(), uuid.uuid1()
 
-    assert run(1) == run(1) != run(2)
+    assert run(1) == run(1)
+    for one, other in zip(run(1), run(2), strict=True):
+        assert one != other
