@@ -90,8 +90,12 @@ def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable
             return _wait_for_turns(threads, lambda: not self.locked(), take, limit)
         return real_acquire(self, blocking, timeout)
 
-    for name in ('acquire', 'acquire_lock', '__enter__'):
+    def enter(self: Any) -> Any:
+        return real_acquire(self, False) or acquire(self)
+
+    for name in ('acquire', 'acquire_lock'):
         yield ReplacedMethod(LOCK_TYPE, name), acquire
+    yield ReplacedMethod(LOCK_TYPE, '__enter__'), enter
 
 
 def _reentrant_locks(
@@ -124,8 +128,11 @@ def _reentrant_locks(
         for _ in range(state[0] - 1):
             real_acquire(self)
 
+    def enter(self: Any) -> Any:
+        return real_acquire(self, False) or acquire(self)
+
     yield target, acquire
-    yield entry, acquire
+    yield entry, enter
     yield restoring, acquire_restore
 
 

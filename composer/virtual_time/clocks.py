@@ -7,6 +7,7 @@ import time
 from threading import TIMEOUT_MAX, get_ident
 from typing import TYPE_CHECKING, Any, Final
 
+from composer.virtual_time.originals import MOST_LOOKS
 from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
 
 if TYPE_CHECKING:
@@ -39,34 +40,11 @@ def clocks(
     Args:
         start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
     """
-    # Each callback reads the time several times.
-    by_ident = threads.by_ident
-
-    def clock_of(builtin: Any, start_ns: int, divisor: float) -> tuple[Any, Callable[..., Any]]:
-        target = ReplacedFunction(builtin)
-        original = target.original
-
-        def read_ns() -> Any:
-            thread = by_ident.get(get_ident())
-            if thread is None:
-                return original()
-            threads.count_look(thread)
-            return start_ns + threads.now_ns
-
-        def read_sec() -> Any:
-            thread = by_ident.get(get_ident())
-            if thread is None:
-                return original()
-            threads.count_look(thread)
-            return (start_ns + threads.now_ns) / divisor
-
-        return target, read_ns if divisor == 1 else read_sec
-
     for name in ('monotonic', 'perf_counter'):
-        yield clock_of(getattr(time, name), MONOTONIC_START_NS, 1e9)
-        yield clock_of(getattr(time, f'{name}_ns'), MONOTONIC_START_NS, 1)
-    yield clock_of(time.time, start_time_ns, 1e9)
-    yield clock_of(time.time_ns, start_time_ns, 1)
+        yield _clock(threads, getattr(time, name), MONOTONIC_START_NS, 1e9)
+        yield _clock(threads, getattr(time, f'{name}_ns'), MONOTONIC_START_NS, 1)
+    yield _clock(threads, time.time, start_time_ns, 1e9)
+    yield _clock(threads, time.time_ns, start_time_ns, 1)
     for name, divisor in (('clock_gettime', 1e9), ('clock_gettime_ns', 1)):
         yield _clock_by_identifier(threads, getattr(time, name), start_time_ns, divisor)
     for name, place in (('localtime', 0), ('gmtime', 0), ('ctime', 0)):
@@ -74,6 +52,34 @@ def clocks(
     for name, place in (('strftime', 1), ('asctime', 0)):
         yield _calendar(threads, getattr(time, name), place, time.localtime)
     yield from _datetimes(threads)
+
+
+def _clock(
+    threads: SimulatedThreads, builtin: Any, start_ns: int, divisor: float
+) -> tuple[Any, Callable[..., Any]]:
+    target = ReplacedFunction(builtin)
+    # Each callback reads the time several times.
+    original, by_ident = target.original, threads.by_ident
+
+    def read_ns() -> Any:
+        thread = by_ident.get(get_ident())
+        if thread is None:
+            return original()
+        thread.looks += 1
+        if thread.looks > MOST_LOOKS:
+            threads.let_time_pass(thread)
+        return start_ns + threads.now_ns
+
+    def read_sec() -> Any:
+        thread = by_ident.get(get_ident())
+        if thread is None:
+            return original()
+        thread.looks += 1
+        if thread.looks > MOST_LOOKS:
+            threads.let_time_pass(thread)
+        return (start_ns + threads.now_ns) / divisor
+
+    return target, read_ns if divisor == 1 else read_sec
 
 
 def _clock_by_identifier(

@@ -12,6 +12,8 @@ from typing import Any, Final
 
 from composer.virtual_time.replaced_functions import ReplacedFunction
 
+# Who looks so often at a clock without a wait waits for the time.
+MOST_LOOKS: Final = 1000
 LOCK_TYPE: Final = type(_thread.allocate_lock())
 
 REAL: Final[Any] = SimpleNamespace(

@@ -19,7 +19,7 @@ from threading import get_ident
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from composer.errors import ComposerError
-from composer.virtual_time.originals import REAL
+from composer.virtual_time.originals import MOST_LOOKS, REAL
 from composer.virtual_time.preemption import Preemption
 
 if TYPE_CHECKING:
@@ -35,9 +35,7 @@ _STUCK_LOOK_SEC: Final = 0.01
 _ON_TIME: Final = 0
 _LATE: Final = 1
 _MOST_ROUNDS: Final = 1000
-# Who looks so often without a wait waits for the time: it passes then at each so many looks more.
-# A wait of no length counts as some.
-_MOST_LOOKS: Final = 1000
+# Time passes at each so many looks more than `MOST_LOOKS`. A wait of no length counts as some.
 _LOOKS_PER_STEP: Final = 100
 _LOOKS_PER_WAIT: Final = 10
 _STEP_NS: Final = 1_000_000
@@ -259,8 +257,8 @@ class SimulatedThreads:
         wait = _Wait(me, attempt)
         is_long = timeout_ns is None or timeout_ns > 0
         me.looks = 0 if is_long else me.looks + _LOOKS_PER_WAIT
-        if me.looks > _MOST_LOOKS:
-            me.looks, timeout_ns = _MOST_LOOKS - _LOOKS_PER_STEP, _STEP_NS
+        if me.looks > MOST_LOOKS:
+            me.looks, timeout_ns = MOST_LOOKS - _LOOKS_PER_STEP, _STEP_NS
         if timeout_ns is not None:
             until_ns = self.now_ns + max(timeout_ns, 0)
             entry = (until_ns, _LATE if is_late else _ON_TIME, next(self._numbers), wait)
@@ -283,9 +281,14 @@ class SimulatedThreads:
         That depends only on what the thread does, so that it is the same in each run.
         """
         thread.looks += 1
-        if thread.looks > _MOST_LOOKS and thread is self.current and not self._is_picking:
+        if thread.looks > MOST_LOOKS:
+            self.let_time_pass(thread)
+
+    def let_time_pass(self, thread: SimulatedThread) -> None:
+        """Wait a little, as the calling thread looks at clocks all the time."""
+        if thread is self.current and not self._is_picking:
             self.sleep(_STEP_NS)
-            thread.looks = _MOST_LOOKS - _LOOKS_PER_STEP
+            thread.looks = MOST_LOOKS - _LOOKS_PER_STEP
 
     def pause(self) -> None:
         """Let others run first, if any can."""

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.virtual_time.originals import REAL
@@ -23,6 +23,7 @@ from tests.virtual_time.virtual_runs import virtual_time
     delays=st.lists(st.lists(st.integers(0, 3), max_size=5), max_size=6),
     seed=st.none() | st.integers(0, 3),
 )
+@settings(max_examples=40)
 def test_threads_run_in_the_same_order_each_time(delays, seed):
     def run():
         seen, lock = [], threading.Lock()
