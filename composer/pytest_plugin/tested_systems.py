@@ -37,7 +37,7 @@ with warnings.catch_warnings(), suppress(ImportError):
 __tracebackhide__ = True
 
 # Of what happened before a test failed, the end is shown.
-_MOST_EVENTS = 20
+_MOST_EVENTS, _MOST_LINES = 20, 30
 # A behaviour that is looked at in a debugger takes its time.
 _REAL_LIMIT_SEC = 60.0
 _NO_LIMIT_SEC = 1e6
@@ -143,7 +143,7 @@ class TestedSystems:
             events = system.events[-_MOST_EVENTS:]
             texts = {
                 'last events': [render_event(event) for event in events],
-                'log': list(list_log(system.events)),
+                'log': list(list_log(system.events))[-_MOST_LINES:],
                 'errors of behaviours': [str(event.value) for event in system.raised()],
                 'not repeatable': [str(notice) for notice in system.notices],
             }
