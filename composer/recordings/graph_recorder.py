@@ -21,6 +21,7 @@ from rclpy.qos import (
 
 from composer.errors import ComposerError
 from composer.executor.c_bindings import watch_subscription
+from composer.interfaces.classes import interface_name
 from composer.recordings.definitions import import_message
 from composer.recordings.metadata import INFINITE_NS
 from composer.recordings.serialized_messages import MessageTaker
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node as RosNode
     from rclpy.subscription import Subscription as RosSubscription
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
 
     from composer.recordings.mcap_writer import Channel
     from composer.recordings.recorder import Recorder
@@ -85,9 +87,10 @@ class _NoPublishers:
 class _Listener:
     """A subscription whose messages are recorded."""
 
-    def __init__(self, ros: RosSubscription, channel: Channel) -> None:
+    def __init__(self, ros: RosSubscription, channel: Channel, publishers: int) -> None:
         self.ros = ros
         self.channel = channel
+        self.publishers = publishers
         self.event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         with ros.handle:
             watch_subscription(ros.handle.pointer, self.event)
@@ -171,6 +174,7 @@ class GraphRecorder:
         """Subscribe to the topics that have come; return when to look again, in seconds."""
         begun = thread_time()
         found = list(self._find_new())
+        self._tell_unmatched()
         pause_sec = _PAUSE_FACTOR * (thread_time() - begun)
         for topic, type_name in found:
             self._subscribe(topic, type_name)
@@ -190,12 +194,32 @@ class GraphRecorder:
             else:
                 yield from ((topic, each) for each in new)
 
-    def _subscribe(self, topic: str, type_name: str) -> None:
-        ends = [
+    def _tell_unmatched(self) -> None:
+        """Tell of publishers that have come since, and offer less than is asked for."""
+        for listener in self._listeners.values():
+            topic, before = listener.channel.topic, listener.publishers
+            if self._node.count_publishers(topic) - self._own.count(topic) <= before:
+                continue
+            ends = self._find_publishers(topic, interface_name(listener.ros.msg_type))
+            listener.publishers = max(before, len(ends))
+            asked = _adapt(read_offer(each.qos_profile) for each in ends)
+            profile = listener.ros.qos_profile
+            if (asked.reliability, asked.durability) != (profile.reliability, profile.durability):
+                self._report(
+                    f"'{topic}' may be recorded in part: publishers that came later offer other "
+                    'reliability or durability than those before'
+                )
+
+    def _find_publishers(self, topic: str, type_name: str) -> list[TopicEndpointInfo]:
+        """Return the publishers of others."""
+        return [
             each
             for each in self._node.get_publishers_info_by_topic(topic)
             if each.topic_type == type_name and not self._own.has(bytes(each.endpoint_gid))
         ]
+
+    def _subscribe(self, topic: str, type_name: str) -> None:
+        ends = self._find_publishers(topic, type_name)
         if not ends:
             return
         self._heard.add((topic, type_name))
@@ -211,7 +235,7 @@ class GraphRecorder:
             message_class, topic, lambda _message: None, profile, raw=True
         )
         self._own.adopt(self._node, ros)
-        listener = _Listener(ros, channel)
+        listener = _Listener(ros, channel, len(ends))
         self._listeners[listener.event] = listener
         self._poll.register(listener.event, select.POLLIN)
         # Some may have come before it was watched.

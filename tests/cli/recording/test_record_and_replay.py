@@ -272,6 +272,22 @@ def test_topics_that_come_and_go_are_recorded(recording, peer, tmp_path, wait_fo
     assert counts == {'/early': 100, '/late': 100}
 
 
+def test_a_later_publisher_that_offers_less_is_told(recording, peer, tmp_path, wait_for):
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+    from std_msgs.msg import String
+
+    with recording('-o', 'a.mcap', '--topics', '/mixed', '--topics', '/last') as lines:
+        peer.advertise(String, '/mixed')
+        profile = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+        peer.run(peer.node.create_publisher, String, '/mixed', profile)
+        # The recorder finds a later topic in the look in which it tells.
+        peer.advertise(String, '/last')
+    assert [line for line in lines if line.startswith('warning')] == [
+        "warning: '/mixed' may be recorded in part: publishers that came later offer other "
+        'reliability or durability than those before'
+    ]
+
+
 @pytest.mark.parametrize(
     ('words', 'code', 'lines'),
     [
