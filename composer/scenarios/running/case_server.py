@@ -6,6 +6,8 @@ in which they end. It ends, with all that it has started, when the connection cl
 
 from __future__ import annotations
 
+import os
+import shutil
 import signal
 import sys
 import warnings
@@ -104,6 +106,10 @@ def main(descriptor: int) -> None:
     connection = Connection(descriptor)
     warm_up()
     share_memory()
-    with suppress(BrokenPipeError):
-        CaseServer(connection).serve()
+    try:
+        with suppress(BrokenPipeError):
+            CaseServer(connection).serve()
+    finally:
+        # The caller may have been killed, and this one outlives it.
+        shutil.rmtree(os.environ['ROS_LOG_DIR'], ignore_errors=True)
     sys.exit(0)
