@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import StrictUndefined, TemplateRuntimeError, TemplateSyntaxError, Undefined, nodes
 from jinja2.exceptions import SecurityError
+from jinja2.lexer import TOKEN_ASSIGN
 from jinja2.parser import Parser
 from jinja2.runtime import new_context
 from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
@@ -105,7 +106,9 @@ class Sandbox(SandboxedEnvironment):
         parser = Parser(self, code, state='variable')
         expression = parser.parse_expression()
         if not parser.stream.eos:
+            is_assignment = parser.stream.current.type == TOKEN_ASSIGN
             message = 'unexpected text after the expression'
+            message = "'=' compares nothing: write '=='" if is_assignment else message
             raise TemplateSyntaxError(message, parser.stream.current.lineno)
         return expression
 

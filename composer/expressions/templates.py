@@ -242,11 +242,13 @@ class TemplateEvaluator:
         declared = self._values or find_nearest(name, scope)
         listed = 'in scope are' if declared else None
         dotted = next((each for each in self._values if each.startswith(f'{name}.')), None)
-        advice = (
-            f'write {written_in_expression(dotted)}'
-            if dotted
-            else suggest(name, scope, listed, "declare it as an argument, under 'args'")
-        )
+        advice: str | None
+        if dotted:
+            advice = f'write {written_in_expression(dotted)}'
+        elif name in self._sandbox.filters:
+            advice = f"it is a filter: write 'value | {name}'"
+        else:
+            advice = suggest(name, scope, listed, "declare it as an argument, under 'args'")
         message = f"'{name}' is not defined"
         return diagnostic_at(locate_name(name, span), 'undefined-name', message, help=advice)
 

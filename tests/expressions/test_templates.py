@@ -139,12 +139,13 @@ def test_an_undefined_name_is_shown_where_it_stands(state, name, place):
 
 
 def test_an_undefined_name_comes_with_the_nearest_one_or_with_all():
-    text = '{x: "{{ nmae }}", z: "{{ rnge(2) }}", y: "{{ zzz }}"}'
+    text = '{x: "{{ nmae }}", z: "{{ rnge(2) }}", y: "{{ zzz }}", w: "{{ abs(count) }}"}'
     helps = [each.help for each in load(text).diagnostics]
     assert helps == [
         "did you mean 'name'?",
         "did you mean 'range'?",
         'in scope are: count, env, find, here, loud, name, range, rate',
+        "it is a filter: write 'value | abs'",
     ]
     (finding,) = load_system_text('version: 1\nnodes: {}\ndescription: "{{ a }}"').diagnostics
     assert finding.help == "declare it as an argument, under 'args'"
@@ -182,6 +183,7 @@ def test_nothing_is_in_scope_that_is_not_promised(name):
         ('', 'unexpected end of the expression'),
         ('count +', 'unexpected end of the expression'),
         ('count count', 'unexpected text after the expression'),
+        ('count = 3', "'=' compares nothing: write '=='"),
         ('1 / 0', 'the expression raised ZeroDivisionError: division by zero'),
         ("count + 'a'", "unsupported operand type(s) for +: 'int' and 'str'"),
         ('name.nothing', "'str object' has no attribute 'nothing'"),
