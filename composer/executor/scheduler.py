@@ -346,7 +346,11 @@ class Scheduler:
             self.running -= 1
             source.pending += source.spends
             source.queued = True
-            self._deferred.append(source)
+            if source in self._ready:
+                # A reentrant group queues it for its next event when it begins with one.
+                self._ready.remove(source)
+            if source not in self._deferred:
+                self._deferred.append(source)
             group = source.group
             group.active = False
             if group.parked:

@@ -14,6 +14,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallb
 from rclpy.context import Context
 from rclpy.task import Future
 from spinning import DEADLINE_SEC, spinning, wait_for
+from test_msgs.msg import Strings
 
 from composer.executor import ComposerExecutor
 
@@ -50,6 +51,38 @@ def test_an_exclusive_group_runs_one_callback_at_a_time(node: Any, executor: Any
 
 def test_a_reentrant_group_runs_a_callback_beside_itself(node: Any, executor: Any) -> None:
     assert _overlap(node, executor, [ReentrantCallbackGroup()]) > 1
+
+
+def test_a_reentrant_group_that_refuses_is_not_asked_without_end(node: Any, executor: Any) -> None:
+    asked: list[bool] = []
+    got: list[str] = []
+    opened = threading.Event()
+
+    class Gated(ReentrantCallbackGroup):
+        def beginning_execution(self, entity: Any) -> bool:
+            asked.append(opened.is_set())
+            return opened.is_set() and super().beginning_execution(entity)
+
+        def can_execute(self, entity: Any) -> bool:
+            return opened.is_set() and super().can_execute(entity)
+
+    publisher = node.create_publisher(Strings, 'topic', 10)
+    node.create_subscription(
+        Strings,
+        'topic',
+        lambda message: got.append(message.string_value),
+        10,
+        callback_group=Gated(),
+    )
+    with spinning(executor):
+        for text in 'abc':
+            publisher.publish(Strings(string_value=text))
+        wait_for(lambda: asked)
+        time.sleep(0.2)
+        assert len(asked) < 1000
+        opened.set()
+        wait_for(lambda: len(got) == 3)
+    assert sorted(got) == ['a', 'b', 'c']
 
 
 def test_num_threads_bounds_what_runs_at_the_same_time(context: Context) -> None:
