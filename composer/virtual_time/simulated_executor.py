@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
-from weakref import WeakKeyDictionary
 
 from rclpy.event_handler import QoSPublisherEventType, QoSSubscriptionEventType
 
@@ -17,6 +16,7 @@ from composer.executor.deadlines import Deadlines
 from composer.executor.descriptors import TimerFd
 from composer.executor.event_poller import EventPoller
 from composer.executor.scheduler import Scheduler
+from composer.executor.sources.entity_sources import TimerSource
 from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.sources.qos_events import QosEvent, QosEventPoll
 from composer.executor.spinner import Spinner
@@ -53,6 +53,9 @@ class SimulatedExecutor(SystemExecutor):
         super().__init__(context, limit, **calls)
         # In the order in which they came.
         self._nodes: Any = _OrderedSet()
+
+    def observe(self, node: Any, entity: Any, observer: Any) -> None:
+        """Do nothing: in virtual time nothing is late or missed."""
 
     def _create_spinner(self, max_running: int) -> Spinner:
         threads = self._threads
@@ -111,17 +114,17 @@ class _Deadlines(Deadlines):
 
     def __init__(self, threads: SimulatedThreads, wake: Callable[[], None]) -> None:
         self._threads = threads
-        self._ranks: WeakKeyDictionary[Any, int] = WeakKeyDictionary()
+        self._ranks: dict[TimerSource, int] = {}
         super().__init__(wake)
 
     def _create_timer(self) -> TimerFd:
         return _Timer(self._threads, self.run_due)
 
     def _number(self, timed: Timed) -> Any:
-        rank = self._ranks.get(timed)
-        if rank is None:
-            rank = self._ranks[timed] = next(self._numbers)
-        return rank, next(self._numbers)
+        number = next(self._numbers)
+        if type(timed) is not TimerSource:
+            return number, number
+        return self._ranks.setdefault(timed, number), number
 
     def follow(self, _clock: Any, _follower: Any) -> None:
         """Follow no clock: all of them show virtual time, as the deadlines do."""

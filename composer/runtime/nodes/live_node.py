@@ -216,7 +216,8 @@ class LiveNode:
             self.running,
             deliver=deliver,
             failed=failed,
-            add_time=health.times.add,
+            # Who observes does so in virtual time, which calls do not take.
+            add_time=None if self.system.observe else health.times.add,
             may_begin=self._observed(owner, may_begin),
         )
 
