@@ -44,6 +44,13 @@ _STEP_NS: Final = 1_000_000
 _Due: TypeAlias = 'tuple[int, int, int, _Wait | _Call]'
 
 
+class EndedWhileWaitingError(SystemExit):
+    """Ends a thread that still waits when the system has ended."""
+
+    def __str__(self) -> str:
+        return 'it still waited here when the system ended'
+
+
 class SimulationStuckError(ComposerError):
     """A thread used more real time than allowed, without ever waiting.
 
@@ -251,7 +258,7 @@ class SimulatedThreads:
             # It was given up: others go on without it.
             raise SystemExit
         if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
-            raise SystemExit
+            raise EndedWhileWaitingError
         if me.on_wait is not None:
             me.on_wait()
         wait = _Wait(me, attempt)
@@ -331,14 +338,14 @@ class SimulatedThreads:
             REAL.sleep(_STUCK_LOOK_SEC)
 
     def _end_all(self) -> None:
-        """Have those who wait raise `SystemExit` in their turns."""
+        """Have those who wait raise `EndedWhileWaitingError` in their turns."""
         due, self._due = sorted(self._due, key=itemgetter(slice(3))), []
         for wait in (*self._waits, *(entry[-1] for entry in due)):
             if isinstance(wait, _Wait) and wait.thread is not self.current:
                 self._release(wait)
         for thread in self._ready:
             thread.is_ending = True
-            thread.error = SystemExit()
+            thread.error = EndedWhileWaitingError()
 
     def _let_others_end(self) -> None:
         me = self.current

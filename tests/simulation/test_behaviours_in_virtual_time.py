@@ -379,3 +379,24 @@ def test_behaviours_take_virtual_time(simulate, name):
     assert logged == expected
     assert system.notices == [] or 'thread' in name
     assert time.monotonic() - begun < 20
+
+
+def test_a_behaviour_that_waits_to_the_end_says_so(simulate):
+    system = simulate(
+        'nodes: {n: {timers: {tick: {period: 1.0, behaviour: "parts:tick"}}}}',
+        """
+        import threading
+
+        LOCK = threading.Lock()
+
+        def tick(node):
+            with LOCK, LOCK:
+                pass
+        """,
+    )
+    with system:
+        system.forward(1.5)
+    (error,) = [event for event in system.events if event.kind == 'error']
+    assert 'it still waited here when the system ended' in str(error)
+    assert 'with LOCK, LOCK:' in str(error)
+    assert 'node.shutdown()' not in str(error)

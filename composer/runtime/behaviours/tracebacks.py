@@ -67,7 +67,7 @@ def format_internal_error(error: BaseException) -> str:
 
 
 def _help_of(error: BaseException) -> str | None:
-    if isinstance(error, SystemExit):
+    if type(error) is SystemExit:
         return 'to end the system call node.shutdown()'
     return error.help if isinstance(error, ComposerError) else None
 
