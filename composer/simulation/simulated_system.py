@@ -238,8 +238,7 @@ class SimulatedSystem:
 
     def at(self, seconds: float, function: Callable[[], None]) -> None:
         """Have a function called at a time since the start, in a thread that may wait."""
-        # The nearest: 1.1 is a little more than the decimal that was written.
-        self._threads.call_at(round(seconds * 1e9), lambda: self._begin(function))
+        self._threads.call_at(to_ns(seconds), lambda: self._begin(function))
 
     def _begin(self, function: Callable[[], None]) -> None:
         self._threads.start(function)

@@ -21,9 +21,8 @@ _SECOND_NS: Final = 1_000_000_000
 
 
 def to_ns(seconds: float) -> int:
-    """Return a duration in nanoseconds, rounded up as Python's own waits do."""
-    whole = int(seconds)
-    return whole * _SECOND_NS + -int(-(seconds - whole) * 1e9 // 1)
+    """Return a duration in nanoseconds: the nearest, so that 0.067 s is what was written."""
+    return round(seconds * 1e9)
 
 
 def is_duration(seconds: Any) -> bool:

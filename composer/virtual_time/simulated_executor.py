@@ -54,6 +54,10 @@ class SimulatedExecutor(SystemExecutor):
         # In the order in which they came.
         self._nodes: Any = _OrderedSet()
 
+    def halt(self) -> None:
+        """Wait for nothing when the interpreter ends: virtual time has ended before."""
+        self._is_shutdown = True
+
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Do nothing: in virtual time nothing is late or missed."""
 
