@@ -7,11 +7,9 @@ but one is parked on a lock of its own.
 
 from __future__ import annotations
 
-import ctypes
 import heapq
 import itertools
 import logging
-import time
 from collections import deque
 from contextlib import contextmanager
 from operator import itemgetter
@@ -21,17 +19,14 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from composer.errors import ComposerError
 from composer.virtual_time.originals import MOST_LOOKS, REAL
 from composer.virtual_time.preemption import Preemption
+from composer.virtual_time.simulated_thread import Call, SimulatedThread, Wait
+from composer.virtual_time.stuck_threads import StuckWatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from random import Random
 
 _LOOK_SEC = 0.25
-# A thread that waits in C does no work: it may take so much longer.
-_WAITED_FACTOR: Final = 3
-# What a thread that was given up gets to end.
-_STUCK_SEC: Final = 1.0
-_STUCK_LOOK_SEC: Final = 0.01
 _ON_TIME: Final = 0
 _LATE: Final = 1
 _MOST_ROUNDS: Final = 1000
@@ -41,7 +36,7 @@ _LOOKS_PER_WAIT: Final = 10
 _STEP_NS: Final = 1_000_000
 
 # When, whether after all else at that time, a number that keeps the order, and what.
-_Due: TypeAlias = 'tuple[int, int, int, _Wait | _Call]'
+_Due: TypeAlias = 'tuple[int, int, int, Wait | Call]'
 
 
 class EndedWhileWaitingError(SystemExit):
@@ -51,73 +46,11 @@ class EndedWhileWaitingError(SystemExit):
         return 'it still waited here when the system ended'
 
 
-class SimulationStuckError(ComposerError):
-    """A thread used more real time than allowed, without ever waiting.
-
-    Attributes:
-        thread: The identifier of the thread.
-    """
-
-    def __init__(self, thread: int, limit_sec: float) -> None:
-        message = f'no virtual time passed within {limit_sec:g} s of real time'
-        advice = 'virtual time passes only while everything waits; a loop without waits never ends'
-        super().__init__(message, help=advice)
-        self.thread = thread
-
-
 class NothingHappensError(ComposerError):
     """All threads wait for something that can never come, as there is no time-out."""
 
     def __init__(self) -> None:
         super().__init__('everything waits for something that nobody is going to do')
-
-
-class SimulatedThread:
-    """A thread that takes turns with others.
-
-    Attributes:
-        turn: A real lock that is free when it is this thread's turn.
-        ident: What `threading.get_ident` says in it; 0 before it has begun.
-        is_ending: Whether it has been told to end.
-        is_over: Whether it has ended.
-        looks: How often it has read a clock, or not really waited, since it last did.
-        on_wait: Called before it lets others run.
-        error: What is raised where it waits.
-    """
-
-    __slots__ = ('error', 'ident', 'is_ending', 'is_over', 'looks', 'on_wait', 'turn')
-
-    def __init__(self) -> None:
-        self.turn = REAL.allocate_lock()
-        REAL.acquire(self.turn)
-        self.ident = 0
-        self.is_ending = False
-        self.is_over = False
-        self.looks = 0
-        self.on_wait: Callable[[], None] | None = None
-        self.error: BaseException | None = None
-
-
-class _Wait:
-    """A wait of a thread, until it succeeds or its time is over."""
-
-    __slots__ = ('attempt', 'has_succeeded', 'is_over', 'thread')
-
-    def __init__(self, thread: SimulatedThread, attempt: Callable[[], object] | None) -> None:
-        self.thread = thread
-        self.attempt = attempt
-        self.is_over = False
-        self.has_succeeded = False
-
-
-class _Call:
-    """A function to be called at a time; it must not wait."""
-
-    __slots__ = ('function', 'is_over')
-
-    def __init__(self, function: Callable[[], None]) -> None:
-        self.function = function
-        self.is_over = False
 
 
 def _refuse(_record: object) -> bool:
@@ -147,16 +80,15 @@ class SimulatedThreads:
         self.on_advance: Callable[[int], None] = lambda _now_ns: None
         self.turns = 0
         self.shuffle = shuffle
-        self.limit_sec = limit_sec
         self.by_ident: dict[int, SimulatedThread] = {}
         self._ready: deque[SimulatedThread] = deque()
-        self._waits: dict[_Wait, None] = {}
+        self._waits: dict[Wait, None] = {}
         self._due: list[_Due] = []
         self._numbers = itertools.count()
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
         self._is_picking = False
-        self._stuck: SimulatedThread | None = None
+        self._watch = StuckWatch(limit_sec)
         self._preemption = Preemption(shuffle, self.pause) if shuffle is not None else None
 
     def mine(self) -> SimulatedThread | None:
@@ -220,13 +152,13 @@ class SimulatedThreads:
         REAL.start_new_thread(self.run, (thread, function, *args))
         return thread
 
-    def call_at(self, time_ns: int, function: Callable[[], None]) -> _Call:
+    def call_at(self, time_ns: int, function: Callable[[], None]) -> Call:
         """Have a function called at a time, or now if that has passed; it must not wait.
 
         Returns:
             What `cancel` takes.
         """
-        call = _Call(function)
+        call = Call(function)
         heapq.heappush(self._due, (max(time_ns, self.now_ns), _ON_TIME, next(self._numbers), call))
         return call
 
@@ -261,7 +193,7 @@ class SimulatedThreads:
             raise EndedWhileWaitingError
         if me.on_wait is not None:
             me.on_wait()
-        wait = _Wait(me, attempt)
+        wait = Wait(me, attempt)
         is_long = timeout_ns is None or timeout_ns > 0
         me.looks = 0 if is_long else me.looks + _LOOKS_PER_WAIT
         if me.looks > MOST_LOOKS:
@@ -322,26 +254,15 @@ class SimulatedThreads:
                 if not self._ready:
                     break
                 self._let_others_end()
-            self._end_stuck()
+            self._watch.end()
         finally:
             pools.removeFilter(_refuse)
-
-    def _end_stuck(self) -> None:
-        """End the thread that was given up, at its next line of Python."""
-        stuck, self._stuck = self._stuck, None
-        if stuck is None:
-            return
-        until = REAL.monotonic() + _STUCK_SEC
-        ident, error = ctypes.c_ulong(stuck.ident), ctypes.py_object(SystemExit)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, error)
-        while not stuck.is_over and REAL.monotonic() < until:
-            REAL.sleep(_STUCK_LOOK_SEC)
 
     def _end_all(self) -> None:
         """Have those who wait raise `EndedWhileWaitingError` in their turns."""
         due, self._due = sorted(self._due, key=itemgetter(slice(3))), []
         for wait in (*self._waits, *(entry[-1] for entry in due)):
-            if isinstance(wait, _Wait) and wait.thread is not self.current:
+            if isinstance(wait, Wait) and wait.thread is not self.current:
                 self._release(wait)
         for thread in self._ready:
             thread.is_ending = True
@@ -362,7 +283,7 @@ class SimulatedThreads:
         was_ending, me.is_ending = me.is_ending, True
         return not was_ending or timeout_ns is not None
 
-    def _release(self, wait: _Wait) -> None:
+    def _release(self, wait: Wait) -> None:
         if not wait.is_over:
             self._end(wait)
             self._ready.append(wait.thread)
@@ -386,17 +307,17 @@ class SimulatedThreads:
         if me is not self._visitor:
             REAL.acquire(me.turn)
             return
-        seen, since = (self.turns, self.now_ns), (REAL.monotonic(), 0.0)
+        self._watch.begin(self._progress(), self.current)
         while not self._comes_back(me):
-            now = REAL.monotonic(), _work_of(self.current)
-            if (self.turns, self.now_ns) != seen:
-                seen, since = (self.turns, self.now_ns), now
-            elif self._is_too_long(now[0] - since[0], now[1] - since[1]):
-                stuck = self._stuck = self.current
-                self.current = me
-                if stuck is not None:
-                    stuck.is_ending = True
-                raise SimulationStuckError(stuck.ident if stuck else 0, self.limit_sec)
+            if self._watch.is_stuck(self._progress(), self.current):
+                raise self._watch.give_up(self._replace_current(me))
+
+    def _progress(self) -> tuple[int, int]:
+        return self.turns, self.now_ns
+
+    def _replace_current(self, me: SimulatedThread) -> SimulatedThread | None:
+        before, self.current = self.current, me
+        return before
 
     def _comes_back(self, me: SimulatedThread) -> bool:
         """Return whether it is the turn of the thread from outside, after a short wait."""
@@ -408,13 +329,6 @@ class SimulatedThreads:
                 raise
             self._tell(error)
             return False
-
-    def _is_too_long(self, real_sec: float, work_sec: float) -> bool:
-        """Tell whether a thread that has not waited for so long is stuck.
-
-        Its own work counts: on a crowded machine it may have to wait for a processor.
-        """
-        return work_sec > self.limit_sec or real_sec > _WAITED_FACTOR * self.limit_sec
 
     def _pick(self) -> SimulatedThread:
         """Return the thread whose turn is next, at a later time if there is none now."""
@@ -464,7 +378,7 @@ class SimulatedThreads:
         if self.shuffle is not None and len(now) > 1:
             self.shuffle.shuffle(now)
         for what in now:
-            if isinstance(what, _Wait):
+            if isinstance(what, Wait):
                 self._release(what)
             elif not what.is_over:
                 what.is_over = True
@@ -485,13 +399,6 @@ class SimulatedThreads:
         if self._visitor not in self._ready:
             self._ready.append(self._visitor)
 
-    def _end(self, wait: _Wait) -> None:
+    def _end(self, wait: Wait) -> None:
         wait.is_over = True
         self._waits.pop(wait, None)
-
-
-def _work_of(thread: SimulatedThread | None) -> float:
-    """Return how much processor time a thread has used, in seconds."""
-    if thread is None or not thread.ident:
-        return 0.0
-    return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))

@@ -8,7 +8,7 @@ import pytest
 
 from composer.errors import ComposerError, GoalRejectedError, ParametersRefusedError, StartError
 from composer.simulation.trace import render_event
-from composer.virtual_time.simulated_threads import SimulationStuckError
+from composer.virtual_time.stuck_threads import SimulationStuckError
 
 pytestmark = pytest.mark.ros
 

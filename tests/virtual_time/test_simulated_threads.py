@@ -15,7 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.virtual_time.originals import REAL
-from composer.virtual_time.simulated_threads import NothingHappensError, SimulationStuckError
+from composer.virtual_time.simulated_threads import NothingHappensError
+from composer.virtual_time.stuck_threads import SimulationStuckError
 from tests.virtual_time.virtual_runs import virtual_time
 
 

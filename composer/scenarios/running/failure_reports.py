@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from composer.scenarios.running.case_results import CaseFailure
 from composer.scenarios.times import format_seconds
 from composer.simulation.trace import render_event
-from composer.virtual_time.simulated_threads import SimulationStuckError
+from composer.virtual_time.stuck_threads import SimulationStuckError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
