@@ -1,7 +1,12 @@
-"""`threading.Thread` in virtual time: threads that simulated ones start take turns, too."""
+"""Threads and processes that simulated threads start.
+
+The threads take turns, too. A process takes no virtual time: who waits for it really waits, and
+nobody else runs meanwhile.
+"""
 
 from __future__ import annotations
 
+import subprocess
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -69,3 +74,17 @@ def thread_methods(
         ('is_alive', is_alive_in_turn),
         ('_bootstrap_inner', bootstrap_in_turn),
     )
+
+
+def process_methods(threads: SimulatedThreads) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the methods of `subprocess.Popen` that are others, by their names."""
+    for name in ('communicate', 'wait'):
+        yield name, _really(threads, getattr(subprocess.Popen, name))
+
+
+def _really(threads: SimulatedThreads, method: Callable[..., Any]) -> Callable[..., Any]:
+    def wait(*arguments: Any, **keywords: Any) -> Any:
+        with threads.outside():
+            return method(*arguments, **keywords)
+
+    return wait

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import random
 import select
+import subprocess
 import sys
 import threading
 import uuid
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from composer.virtual_time.blocking_calls import blocking_calls, virtual_select
 from composer.virtual_time.clocks import clocks
-from composer.virtual_time.python_threads import thread_methods
+from composer.virtual_time.python_threads import process_methods, thread_methods
 from composer.virtual_time.replaced_functions import ReplacedFunction
 from composer.virtual_time.unrepeatable import THREAD, Watch, begin
 
@@ -74,6 +75,7 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
         # These Python itself looks up at each call.
         methods = thread_methods(threads, lambda: watch.note(THREAD))
         attributes: list[tuple[Any, str, Any]] = [(threading.Thread, *each) for each in methods]
+        attributes += [(subprocess.Popen, *each) for each in process_methods(threads)]
         attributes += [(select, 'select', virtual_select(threads)), *_UUID1]
         for owner, name, value in attributes:
             stack.callback(setattr, owner, name, getattr(owner, name))
