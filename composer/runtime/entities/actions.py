@@ -200,6 +200,7 @@ class _Execution:
         self._node = node
         self._queue = queue
         self._name = node.ros.resolve_action_name(spec.action)
+        self._node_name = node.full_name
         self._begin = node.bind(spec.behaviour, Owner('action', spec.name))
         self._result_class = action_class.Result
         self._to_result = converter_for(action_class.Result).convert
@@ -233,13 +234,13 @@ class _Execution:
 
     def tell(self, kind: EventKind, message: Any) -> None:
         """Tell who observes the system."""
-        self._node.system.tell(kind, self._node.full_name, self._name, message)
+        self._node.system.tell(kind, self._node_name, self._name, message)
 
     def _tell_result(self, goal: Any, result: Any) -> None:
         if (observe := self._node.system.observe) is not None:
             status = STATUS_NAMES.get(goal.status, 'unknown')
             copy = ownership_of(self._result_class).copy
-            observe('result', self._node.full_name, self._name, (status, copy(result)))
+            observe('result', self._node_name, self._name, (status, copy(result)))
 
     def is_ending(self) -> bool:
         """Return whether goals are neither accepted nor continued."""

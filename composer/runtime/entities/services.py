@@ -86,11 +86,11 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
     )
     run, full_name = call.run, node.ros.resolve_service_name(spec.service)
 
-    tell = node.system.tell
+    tell, node_name = node.system.tell, node.full_name
 
     def checked(response: Any) -> Any:
         if response is not FAILED:
-            tell('response', node.full_name, full_name, response)
+            tell('response', node_name, full_name, response)
             return response
         if isinstance(node.gate, LifecycleGate) and node.gate.rests:
             _tell_refusal(node, node.gate, owner)
@@ -100,11 +100,11 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
         raise NoResponseError(message)
 
     def serve(request: Any, _response: Any) -> Any:
-        tell('request', node.full_name, full_name, request)
+        tell('request', node_name, full_name, request)
         return checked(FAILED if node.gate.rests else run(request))
 
     async def serve_async(request: Any, _response: Any) -> Any:
-        tell('request', node.full_name, full_name, request)
+        tell('request', node_name, full_name, request)
         return checked(FAILED if node.gate.rests else await run(request))
 
     return serve_async if call.is_async else serve
