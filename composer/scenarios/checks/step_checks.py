@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from composer.scenarios.checks.channels_of_cases import check_type, explain_unknown, is_known
 from composer.scenarios.checks.message_fields import check_message, part_of
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from composer.entity_kinds import ChannelKind
     from composer.scenarios.checks.scenario_context import ScenarioContext
     from composer.scenarios.specs import CaseSpec
+
+
+_CLOCK: Final = '/clock'
 
 
 def check_steps(context: ScenarioContext, case: CaseSpec) -> Iterator[Diagnostic]:
@@ -60,6 +63,8 @@ def _check_publish(
 def _near_alone(context: ScenarioContext, kind: ChannelKind, name: str) -> str | None:
     if context.channel(kind, name):
         return None
+    if name == _CLOCK:
+        return 'virtual time is the time of all clocks: what is published there sets none'
     help_text = context.suggest_channel(kind, name) or ''
     return help_text if help_text.startswith('did you mean') else None
 

@@ -43,6 +43,9 @@ WRONG = [
      "its 'type' if it is none of the system's)"),
     ({'when': '{publish: /other, type: std_msgs/msg/String}'},
      "/other no-subscription: no node of this system subscribes to '/other'"),
+    ({'when': '{publish: /clock, type: rosgraph_msgs/msg/Clock}'},
+     "/clock no-subscription: no node of this system subscribes to '/clock' (virtual time is the "
+     'time of all clocks: what is published there sets none)'),
     ({'when': '{publish: /speed}'},
      "/speed no-subscription: no node of this system subscribes to '/speed'"),
     ({'when': '{publish: /scan, type: std_msgs/msg/String}'},
