@@ -22,6 +22,7 @@ from composer.planning.snapshot import take_snapshot
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
+from composer.scenarios.recognition import is_scenario_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -69,6 +70,7 @@ def up(  # noqa: PLR0913 - one for each option
     if ends_process and isinstance(sys.stdout, io.TextIOWrapper):
         # What behaviours print is shown at once, in a file, too.
         sys.stdout.reconfigure(line_buffering=True)
+    _refuse_scenario(paths[0])
     if watches and str(paths[0]) == '-':
         message = '--watch cannot watch standard input, which is read once'
         raise UsageError(message, help='give a file')
@@ -110,6 +112,12 @@ def up(  # noqa: PLR0913 - one for each option
             ends_process=ends_process,
             rehearses=rehearses,
         )
+
+
+def _refuse_scenario(path: Path) -> None:
+    if str(path) != '-' and is_scenario_file(path):
+        message = f"'{path}' is a scenario file, which tests a system"
+        raise UsageError(message, help=f'run it with composer test {path}')
 
 
 def _show_errors(findings: list[Diagnostic]) -> None:

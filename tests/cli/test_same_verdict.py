@@ -4,6 +4,7 @@ import pytest
 
 from composer.cli import main as cli
 from composer.rules import RULES_FOLDER, Severity, load_rule
+from composer.scenarios.recognition import is_scenario_file
 
 REFUSED = [
     pytest.param(path.parent.name, marks=pytest.mark.ros if rule.needs else ())
@@ -21,6 +22,10 @@ def test_what_check_refuses_is_refused_in_the_same_words(rule, capsys, monkeypat
     assert cli.run(['check', '--quiet', *imports, 'bad.yaml']) == 1
     said = capsys.readouterr().out
     assert f'error[{rule}]: ' in said
+    if is_scenario_file(RULES_FOLDER / rule / 'bad.yaml'):
+        assert cli.run(['up', 'bad.yaml']) == 2
+        assert 'run it with composer test bad.yaml' in capsys.readouterr().err
+        return
     assert cli.run(['up', 'bad.yaml']) == 1
     assert capsys.readouterr() == ('', said)
 

@@ -143,7 +143,7 @@ def test_others_live_on_when_a_behaviour_destroys_what_its_node_has(compose):
         child.wait_for_line(f'[{name}]: destroying')
     alive = len(child.matching('[good]: alive'))
     child.wait_for_line('[good]: alive', times=alive + 20)
-    assert child.stop() == 0
+    assert child.stop() == 0, child.output
 
     for name in names:
         assert len(child.matching(f'[{name}]: alive')) == 1

@@ -271,9 +271,10 @@ class ClientSource(EventSource):
     def run(self) -> Any:
         """See the base class."""
         parts = self.parts
-        # A run in vain may have yielded: that does not count for what comes after it.
+        # A run in vain may have yielded: that does not count for what comes after it. What came
+        # before may be queued behind this by now: another thread may have looked.
         if self.revision != self._yielded_at and (
-            parts.poller.peek() or parts.scheduler.count_tasks()
+            parts.poller.peek() or not parts.scheduler.is_empty()
         ):
             self._yielded_at = self.revision + 1
             parts.scheduler.add_events(self, 1)

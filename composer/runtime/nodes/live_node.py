@@ -257,9 +257,10 @@ class LiveNode:
         self, owner: Owner, may_begin: Callable[[], bool] | None
     ) -> Callable[[], bool] | None:
         """Return what tells whether a call may begin, and that it does, if somebody observes."""
-        observe, name, what = self.system.observe, self.full_name, str(owner)
+        observe = self.system.observe
         if observe is None:
             return may_begin
+        name, what = self.full_name, str(owner)
 
         def begin() -> bool:
             may_call = may_begin is None or may_begin()
