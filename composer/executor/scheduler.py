@@ -159,10 +159,6 @@ class Scheduler:
         """Tell whether nothing is ready."""
         return not (self._ready or self._announced or self._tasks or self._new_tasks)
 
-    def count_tasks(self) -> int:
-        """Return how many tasks could run now."""
-        return len(self._tasks) + len(self._new_tasks)
-
     def has_work(self) -> bool:
         """Tell whether something is ready, and one more callback may run."""
         return not self.is_empty() and self._has_free_slot()

@@ -76,8 +76,10 @@ def _wait_for_turns(
             return taken
 
 
-def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
-    real_acquire = REAL.acquire
+def _acquiring(
+    threads: SimulatedThreads, real_acquire: Callable[..., Any], is_free: Callable[[Any], bool]
+) -> Callable[..., Any]:
+    """Return the method `acquire` of a kind of locks."""
 
     def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002 - as C has it
         if blocking and (timeout == _NO_TIMEOUT or is_duration(timeout)):
@@ -87,8 +89,15 @@ def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable
                 return real_acquire(self, blocking, timeout)
             limit = None if timeout == _NO_TIMEOUT else timeout
             take = lambda: real_acquire(self, False)  # noqa: E731
-            return _wait_for_turns(threads, lambda: not self.locked(), take, limit)
+            return _wait_for_turns(threads, lambda: is_free(self), take, limit)
         return real_acquire(self, blocking, timeout)
+
+    return acquire
+
+
+def _locks(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+    real_acquire = REAL.acquire
+    acquire = _acquiring(threads, real_acquire, lambda lock: not lock.locked())
 
     def enter(self: Any) -> Any:
         return real_acquire(self, False) or acquire(self)
@@ -107,18 +116,8 @@ def _reentrant_locks(
     restoring = ReplacedMethod(lock_type, '_acquire_restore')
     real_acquire = target.original
 
-    def acquire(self: Any, blocking: Any = True, timeout: Any = _NO_TIMEOUT) -> Any:  # noqa: FBT002
-        if blocking and (timeout == _NO_TIMEOUT or is_duration(timeout)):
-            if real_acquire(self, False):
-                return True
-            if threads.mine() is None:
-                return real_acquire(self, blocking, timeout)
-            limit = None if timeout == _NO_TIMEOUT else timeout
-            take = lambda: real_acquire(self, False)  # noqa: E731
-            # Nothing else tells whether somebody has it.
-            is_free = lambda: repr(self).startswith('<unlocked')  # noqa: E731
-            return _wait_for_turns(threads, is_free, take, limit)
-        return real_acquire(self, blocking, timeout)
+    # Nothing else tells whether somebody has it.
+    acquire = _acquiring(threads, real_acquire, lambda lock: repr(lock).startswith('<unlocked'))
 
     def acquire_restore(self: Any, state: Any) -> None:
         if threads.mine() is None:
