@@ -43,6 +43,7 @@ ROOMS = (
     ),
     *('virtual_time', 'recordings', 'simulation', 'scenarios'),
     'stubs',
+    'export',
     *('cli', 'pytest_plugin', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

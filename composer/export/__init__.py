@@ -1,0 +1,1 @@
+"""Systems for what runs services elsewhere: units, Compose files, manifests."""
