@@ -315,7 +315,10 @@ class Host:
         self._bed.enter('ip', 'link', 'add', link, 'type', 'veth', 'peer', *ends)
         self._bed.enter('ip', 'link', 'set', link, 'master', 'bed', 'up')
         inside = ['nsenter', '--net', '--target', init, 'ip']
+        # A network card keeps its address when its host starts again.
+        card = f'02:77:00:00:01:{int(self.address.rpartition(".")[2]):02x}'
         for words in (
+            ['link', 'set', 'eth0', 'address', card],
             ['link', 'set', 'lo', 'up'],
             ['address', 'add', f'{self.address}/16', 'dev', 'eth0'],
             ['link', 'set', 'eth0', 'up'],
