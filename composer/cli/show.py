@@ -147,7 +147,7 @@ def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
         absolute['interfaces'] = {package: _absolute(folder) for package, folder in folders}
     if 'environment' in data:
         absolute['environment'] = _without_values(data['environment'])
-    for section in ('nodes', 'processes'):
+    for section in ('nodes', 'processes', 'workers', 'hosts'):
         if section in data:
             entries = data[section].items()
             absolute[section] = {name: _entry_with_absolute(entry) for name, entry in entries}
@@ -177,8 +177,11 @@ def _entry_with_absolute(entry: dict[str, Any]) -> dict[str, Any]:
     if 'components' in entry:
         components = entry['components'].items()
         changed['components'] = {name: _entry_with_absolute(each) for name, each in components}
-    if 'env' in entry:
-        changed['env'] = _without_values(entry['env'])
+    if 'identity_file' in entry and not entry['identity_file'].startswith('~'):
+        changed['identity_file'] = _absolute(entry['identity_file'])
+    for key in ('env', 'environment'):
+        if key in entry:
+            changed[key] = _without_values(entry[key])
     return entry | changed
 
 

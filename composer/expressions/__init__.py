@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 # The sections whose entries may be repeated; so may the entities of nodes, and components.
-SECTIONS = ('nodes', 'include', 'processes', 'containers')
+SECTIONS = ('nodes', 'include', 'processes', 'containers', 'workers', 'hosts')
 
 # The words that an expression does not read as names.
 _RESERVED = frozenset(

@@ -26,7 +26,11 @@ def apply_defaults(system: LoadedSystem) -> None:
     defaults = data.pop('defaults', {})
     if defaults:
         writer = _DefaultsWriter(system, defaults)
-        for section, write in (('nodes', writer.in_node), ('processes', writer.in_process)):
+        for section, write in (
+            ('nodes', writer.in_node),
+            ('processes', writer.in_process),
+            ('include', writer.in_include),
+        ):
             if section in data:
                 entries = data[section].items()
                 data[section] = {name: write(name, entry) for name, entry in entries}
@@ -48,6 +52,8 @@ class _DefaultsWriter:
         for key in plain.keys() - node.keys():
             self._graft((*at, key), key)
         full = plain | node
+        if 'host' in plain and 'host' not in node:
+            self._system.inherited.add((*at, 'host'))
         if not name.startswith('/'):
             full |= self._namespace(at, node)
         if 'qos' in self._defaults:
@@ -57,9 +63,21 @@ class _DefaultsWriter:
         return full
 
     def in_process(self, name: str, process: dict[str, Any]) -> dict[str, Any]:
+        at = ('processes', name)
+        process = self._placed(at, process, 'host')
         if not takes_ros_arguments(process):
             return with_waits(process, {}, self._defaults.get('namespace', ''))
-        return self._in_program(('processes', name), process)
+        return self._in_program(at, process)
+
+    def in_include(self, name: str, include: dict[str, Any]) -> dict[str, Any]:
+        return self._placed(('include', name), include, 'worker', 'host')
+
+    def _placed(self, at: DataPath, entry: dict[str, Any], *keys: str) -> dict[str, Any]:
+        """Return an entry that says where it runs, if it or the defaults do."""
+        given = [key for key in keys if key in self._defaults and key not in entry]
+        for key in given:
+            self._graft((*at, key), key)
+        return entry | {key: self._defaults[key] for key in given}
 
     def _in_program(self, at: DataPath, process: dict[str, Any]) -> dict[str, Any]:
         full = with_defaults(process, self._defaults)

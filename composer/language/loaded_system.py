@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import Branch, DataPath, Key
 
 # The sections whose entries become part of a file that includes theirs.
-PARTS = ('nodes', 'processes', 'qos', 'interfaces')
+PARTS = ('nodes', 'processes', 'qos', 'interfaces', 'workers', 'hosts')
 
 
 @dataclass(slots=True, kw_only=True)
@@ -37,6 +37,8 @@ class LoadedSystem(Document):
         chains: The includes that entries come from, innermost first, by the entries' paths.
         inner_names: The namespaces, as written, and simple names of nodes that are called by
             their full names only because another node has the simple one.
+        inherited: The paths of hosts that entries have from defaults and includes: that of their
+            worker goes first.
         sampled_unused: As `sampled`, of what is left out.
         start: The values that are read when the system starts.
         filled: The data with these values, or samples of them, in place.
@@ -52,6 +54,7 @@ class LoadedSystem(Document):
     named: dict[Path, None] = field(default_factory=dict)
     chains: dict[DataPath, tuple[Related, ...]] = field(default_factory=dict)
     inner_names: dict[str, tuple[str, str]] = field(default_factory=dict)
+    inherited: set[DataPath] = field(default_factory=set)
     sampled_unused: list[Span] = field(default_factory=list)
     start: StartValues = field(default_factory=StartValues)
     filled: dict[str, Any] = field(default_factory=dict)

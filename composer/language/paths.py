@@ -67,7 +67,7 @@ def resolve_paths(system: LoadedSystem) -> None:
             package: _resolved(folder, ('interfaces', package), positions)
             for package, folder in data['interfaces'].items()
         }
-    for section in ('nodes', 'processes'):
+    for section in ('nodes', 'processes', 'hosts'):
         if section in data:
             resolved[section] = {
                 name: _with_paths(entry, (section, name), positions)
@@ -88,6 +88,10 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
     changed: dict[str, Any] = {}
     if 'cwd' in entry:
         changed['cwd'] = _resolved(entry['cwd'], (*path, 'cwd'), positions)
+    # As ssh reads it, `~` is the folder of who logs in here.
+    if 'identity_file' in entry and not entry['identity_file'].startswith('~'):
+        at = (*path, 'identity_file')
+        changed['identity_file'] = _resolved(entry['identity_file'], at, positions)
     if 'launch' in entry:
         changed['launch'] = _resolved_launch_file(entry['launch'], (*path, 'launch'), positions)
     if 'nodl' in entry:

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 # Sections whose keys are names that the file gives; all other keys are those of the schema.
+# `workers` is not among them: a worker may have its name from a node of any file.
 _NAMED = frozenset(
-    ('args', 'containers', 'include', 'interfaces', 'nodes', 'processes', 'qos', 'vars')
+    ('args', 'containers', 'hosts', 'include', 'interfaces', 'nodes', 'processes', 'qos', 'vars')
 )
 
 

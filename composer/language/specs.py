@@ -7,18 +7,21 @@ Every record carries the path of its data, under which a `SourceMap` knows where
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY  # noqa: TC003 - `dataclass` looks for it
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from dataclasses import KW_ONLY, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 from composer.entity_kinds import CHANNEL_KINDS, ENTITY_KINDS, KIND_OF_SECTION
 from composer.names import join_names
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.entity_kinds import EntityKind
     from composer.yaml_text.positions import DataPath
+
+SpecT = TypeVar('SpecT')
 
 LogLevel: TypeAlias = Literal['debug', 'info', 'warn', 'error', 'fatal']
 OnError: TypeAlias = Literal['log', 'restart', 'shutdown']
@@ -33,10 +36,15 @@ DrivenState: TypeAlias = Literal['inactive', 'active']
 WhileInactive: TypeAlias = Literal['drop', 'keep']
 ProcessState: TypeAlias = Literal['running', 'ended', 'succeeded']
 RestartRule: TypeAlias = Literal['always', 'on_failure', 'never']
+Discovery: TypeAlias = Literal['multicast', 'peers', 'discovery_server', 'zenoh']
 
 DEFAULT_SHUTDOWN_TIMEOUT_SEC = 5.0
 DEFAULT_WAIT_SEC = 30.0
 DEFAULT_RESTART_DELAY_SEC = 1.0
+DEFAULT_HOST_FOLDER = '~/.local/share/composer'
+# Those of `fastdds discovery` and of `zenohd`.
+DEFAULT_SERVER_PORT = 11811
+DEFAULT_ROUTER_PORT = 7447
 # `ros2 launch` gives its processes 5 s after SIGINT, and 5 s after SIGTERM, until it kills them.
 DEFAULT_LAUNCH_STOP_SEC = 15.0
 DEFAULT_DIAGNOSTICS_PERIOD_SEC = 1.0
@@ -455,6 +463,7 @@ class ProcessSpec:
         on_demand: Whether it only starts when the `on_exit` of another one starts it.
         components: What is loaded into it, if it is a container.
         external: Whether it is a container that runs already, and is never started.
+        host: The host that it runs on; empty if the file names none.
     """
 
     name: str
@@ -486,6 +495,7 @@ class ProcessSpec:
     lifecycle: DrivenState | None
     components: Mapping[str, ComponentSpec]
     external: bool
+    host: str
     path: DataPath
 
     @property
@@ -534,6 +544,9 @@ class NodeSpec:
         lifecycle: The state to which a node with a lifecycle brings itself; `None` for one
             without.
         bond: Whether it keeps a bond while it is active.
+        worker: The worker that it runs in; empty for the process of the system.
+        host: The host that it runs on, also if only its worker says so; empty if the file names
+            none.
     """
 
     _: KW_ONLY
@@ -550,6 +563,8 @@ class NodeSpec:
     type_description_service: bool = False
     logger_services: bool = False
     bond: bool = False
+    worker: str = ''
+    host: str = ''
     on_error: OnError
     warn_after_sec: float | None
     parameters: Mapping[str, ParameterSpec]
@@ -629,8 +644,85 @@ class NodeSpec:
 
 
 @record
+class WorkerSpec:
+    """A process of the system in which some of its nodes run.
+
+    Attributes:
+        cpus: The processor cores that it may use; empty for all.
+        nice: What is added to the niceness of the system; `None` for nothing.
+        threads: How many callbacks may run at the same time; `None` as for the system.
+        environment: Environment variables beside those of the system.
+        restart: When it is started again.
+        most_restarts: How many times; `None` for no end.
+        required: Whether its end for good ends the system.
+        host: The host that it runs on, also if only its nodes say so; empty for none.
+        log_level: The level of its nodes that have none of their own.
+        path: Where it is declared; where it is named first if it is not.
+    """
+
+    name: str
+    description: str
+    cpus: tuple[int, ...]
+    nice: int | None
+    threads: int | None
+    environment: Mapping[str, str]
+    restart: RestartRule
+    restart_delay_sec: float
+    most_restarts: int | None
+    required: bool
+    host: str
+    log_level: LogLevel | None
+    path: DataPath
+
+
+@record
+class HostSpec:
+    """A computer that parts of the system run on.
+
+    Attributes:
+        address: An address, or a name that ssh knows.
+        user: Who logs in; empty as ssh has it.
+        port: Of ssh; `None` as ssh has it.
+        python: The interpreter there.
+        identity_file: A private key; empty as ssh has it.
+        folder: Where what is brought there lies.
+        systemd: Which service manager runs its part.
+    """
+
+    name: str
+    description: str
+    address: str
+    user: str
+    port: int | None
+    python: str
+    identity_file: str
+    folder: str
+    systemd: Literal['user', 'system']
+    path: DataPath
+
+
+@record
+class NetworkSpec:
+    """How the processes of the system find each other.
+
+    Attributes:
+        domain_id: The ROS domain; `None` for that of the environment.
+        peers: Addresses to look at beside those of the hosts.
+        server: The host of the discovery server, or of the Zenoh router; empty for none.
+        port: Of the server.
+    """
+
+    discovery: Discovery
+    domain_id: int | None
+    peers: tuple[str, ...]
+    server: str
+    port: int
+    path: DataPath
+
+
+@record
 class SystemSpec:
-    """A whole system.
+    """A whole system, or the part of it that one host or one worker runs.
 
     Attributes:
         name: The file's name without its ending.
@@ -641,6 +733,9 @@ class SystemSpec:
         environment: Environment variables that are set before ROS starts.
         nodes: By their keys in the file: the name, or the full name.
         diagnostics_period_sec: Time between two messages on `/diagnostics`; `None` for none.
+        workers: By name, also those that are only named by nodes.
+        network: `None` if the file says nothing of it.
+        host: The host whose part this is; empty for the whole system.
     """
 
     name: str
@@ -653,6 +748,33 @@ class SystemSpec:
     diagnostics_period_sec: float | None
     nodes: Mapping[str, NodeSpec]
     processes: Mapping[str, ProcessSpec]
+    workers: Mapping[str, WorkerSpec]
+    hosts: Mapping[str, HostSpec]
+    network: NetworkSpec | None
+    host: str = ''
+
+    def on_host(self, name: str) -> SystemSpec:
+        """Return the part of the system that runs on a host."""
+        return replace(
+            self,
+            nodes=_only(self.nodes, lambda each: each.host == name),
+            processes=_only(self.processes, lambda each: each.host == name),
+            workers=_only(self.workers, lambda each: each.host == name),
+            host=name,
+        )
+
+    def in_worker(self, name: str) -> SystemSpec:
+        """Return the part of the system that runs in a worker.
+
+        Args:
+            name: `''` for the process of the system, which has the external processes, and all
+                workers, too.
+        """
+        nodes = _only(self.nodes, lambda each: each.worker == name)
+        if not name:
+            return replace(self, nodes=nodes)
+        workers = _only(self.workers, lambda each: each.name == name)
+        return replace(self, nodes=nodes, workers=workers, processes=MappingProxyType({}))
 
     def end_owners(self) -> Iterator[NodeSpec | DeclaredNodeSpec]:
         """Yield the nodes, and those that external processes are said to have."""
@@ -679,3 +801,7 @@ class SystemSpec:
         own = self.shutdown_timeout_sec
         given = [process.stop_timeout_sec for process in self.processes.values()]
         return own + max((own if each is None else each for each in given), default=0.0)
+
+
+def _only(specs: Mapping[str, SpecT], is_wanted: Callable[[SpecT], bool]) -> Mapping[str, SpecT]:
+    return MappingProxyType({name: each for name, each in specs.items() if is_wanted(each)})

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state', 'components'),
     *('nodes', 'declares_all_ends'),
+    # The part of a host has other nodes and processes then; one that runs all of them does not
+    # care.
+    'host',
     *(kind.section for kind in ENTITY_KINDS),
 }
 # These are part of a node, and what a process is started with.
@@ -96,6 +99,7 @@ _NODES = _Rules(
             'ROS reads this when the node is created',
         ),
         'parameter_files': 'its parameters are declared from them when it is created',
+        'worker': 'a node runs in one process',
         'class': 'its instance is made with the node',
     },
 )

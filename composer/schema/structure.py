@@ -39,6 +39,8 @@ _OUTER_SECTIONS = {
     'include': 'include',
     'processes': 'process',
     'containers': 'container',
+    'workers': 'worker',
+    'hosts': 'host',
 }
 _DEPTH_OF_ENTRIES = 3
 _DEPTH_OF_ENTITIES = 5

@@ -113,7 +113,13 @@ def composer_accepts(data):
     """Return Composer's verdict, and `None` where a limit of the data's own keeps it from one."""
     loaded = load_system_text(json.dumps(data))
     structural = {'missing-key', 'unknown-key', 'wrong-type', 'bad-value', 'out-of-range', 'conflicting-keys', 'unsupported-version'}  # fmt: skip
-    others = {'bad-argument-declaration', 'bad-variable', 'missing-include', 'unknown-qos-profile'}
+    others = {
+        'bad-nodl',
+        'bad-argument-declaration',
+        'bad-variable',
+        'missing-include',
+        'unknown-qos-profile',
+    }
     rules = {each.rule for each in loaded.diagnostics}
     if 'too-many-entries' in rules:
         return None

@@ -73,7 +73,8 @@ class IncludeMerger:
             if not takes_ros_arguments(process):
                 entry = with_waits(entry, {}, inclusion.namespace)
             self._add_entry(inclusion, ('processes', name), keys[name], entry)
-        self._add_interfaces(part)
+        for section in ('interfaces', 'workers', 'hosts'):
+            self._add_declared(section, part)
         self._whole.sampled += part.sampled
         self._whole.sampled_unused += part.sampled_unused
         self._whole.included |= {part.positions.source: None} | part.included
@@ -131,6 +132,7 @@ class IncludeMerger:
             whole.notes[new + path] = note
         if section == 'nodes' or takes_ros_arguments(entry):
             entry = self._with_outer(inclusion, new, entry)
+        entry = self._placed(inclusion, old, new, entry)
         whole.entries.setdefault(section, {})[key] = entry
         whole.dropped |= {new + path[2:] for path in part.dropped if path[:2] == old}
         whole.chains[new] = (*part.chains.get(old, ()), inclusion.entry.here)
@@ -174,6 +176,19 @@ class IncludeMerger:
                 self._copy_place((*inclusion.entry.at, 'remap', rule), (*path, 'remap', rule))
         return plain
 
+    def _placed(
+        self, inclusion: Inclusion, old: DataPath, new: DataPath, entry: dict[str, Any]
+    ) -> dict[str, Any]:
+        """Return an entry that runs where the include says, if it does not say so itself."""
+        outer = inclusion.entry
+        keys = ('worker', 'host') if new[0] == 'nodes' else ('host',)
+        given = {key: outer.data[key] for key in keys if key in outer.data and key not in entry}
+        for key in given:
+            self._copy_place((*outer.at, key), (*new, key))
+        if 'host' in given or (*old, 'host') in inclusion.part.inherited:
+            self._whole.inherited.add((*new, 'host'))
+        return {**entry, **given}
+
     def _copy_place(self, old: DataPath, new: DataPath) -> None:
         positions, notes = self._whole.positions, self._whole.notes
         positions.keys[new] = positions.key(old)
@@ -204,16 +219,20 @@ class IncludeMerger:
         self._whole.dropped |= {path for path in part.dropped if path[:1] == ('qos',)}
         return renaming
 
-    def _add_interfaces(self, part: LoadedSystem) -> None:
-        for package in part.entries.get('interfaces', {}):
-            declared = self._whole.entries.setdefault('interfaces', {})
-            path = ('interfaces', package)
+    def _add_declared(self, section: str, part: LoadedSystem) -> None:
+        """Add what a file declares in a section whose names hold everywhere.
+
+        What the file around it declares under such a name stays.
+        """
+        for name in part.entries.get(section, {}):
+            declared = self._whole.entries.setdefault(section, {})
+            path = (section, name)
             is_left_out = path in part.left_out
-            if not (package in declared and is_left_out):
+            if not (name in declared and is_left_out):
                 self._leave_out(path, is_left_out=is_left_out)
-            if package not in declared:
-                declared[package] = part.entries['interfaces'][package]
-                branch = part.branches('interfaces')[package]
+            if name not in declared:
+                declared[name] = part.entries[section][name]
+                branch = part.branches(section)[name]
                 self._whole.positions.graft(path, branch)
 
 

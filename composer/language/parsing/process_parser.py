@@ -130,6 +130,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         lifecycle=data.get('lifecycle'),
         components=components,
         external=data.get('external', False),
+        host=data.get('host', ''),
         path=path,
     )
 

@@ -17,6 +17,12 @@ from composer.language.parsing.container_parser import (
 from composer.language.parsing.entry_parser import Data, Spec, parse_entries, parse_qos
 from composer.language.parsing.node_parser import parse_node
 from composer.language.parsing.process_parser import parse_process
+from composer.language.parsing.worker_parser import (
+    parse_hosts,
+    parse_network,
+    parse_workers,
+    with_hosts,
+)
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
@@ -65,8 +71,23 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
         filled = fill_start_values(unused, system.positions, samples, system.sampled_unused)
         system.unused = parse_system(filled, name)
     system.data = used
+    _drop_inherited_hosts(system)
     system.filled = fill_start_values(used, system.positions, system.start, system.sampled)
     system.spec = parse_system(system.filled, name, before)
+
+
+def _drop_inherited_hosts(system: LoadedSystem) -> None:
+    """Take the hosts of defaults and includes from nodes whose worker has one of its own."""
+    entries = system.entries
+    workers, nodes = entries.get('workers', {}), entries.get('nodes', {})
+    if not (system.inherited and workers and nodes):
+        return
+    nodes = entries['nodes'] = dict(nodes)
+    for path in system.inherited:
+        node = nodes.get(str(path[1]), {}) if path[0] == 'nodes' else {}
+        if workers.get(node.get('worker'), {}).get('host'):
+            nodes[str(path[1])] = {key: node[key] for key in node if key != 'host'}
+            system.positions.remove(path)
 
 
 def _leave_out_entities(
@@ -99,6 +120,7 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
     if any(node.get('bond') for node in data.get('nodes', {}).values()):
         # It is on no package index.
         interfaces = {_BOND: str(_PACKAGES / _BOND)} | interfaces
+    workers = parse_workers(data)
     return SystemSpec(
         name=name,
         description=data.get('description', ''),
@@ -107,13 +129,18 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
         diagnostics_period_sec=_parse_diagnostics(data.get('diagnostics', True)),
-        nodes=parse_entries(data, (), 'nodes', _keeping(before, 'nodes', parse_node)),
+        nodes=with_hosts(
+            parse_entries(data, (), 'nodes', _keeping(before, 'nodes', parse_node)), data, workers
+        ),
         environment=MappingProxyType(
             {name: format_scalar(value) for name, value in data.get('environment', {}).items()}
         ),
         processes=_with_demand(
             parse_entries(data, (), 'processes', _keeping(before, 'processes', parse_process))
         ),
+        workers=workers,
+        hosts=parse_hosts(data),
+        network=parse_network(data.get('network')),
     )
 
 
