@@ -33,6 +33,7 @@ from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
+from composer.checks.placement.hosts_and_workers import check_hosts, check_workers
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import (
@@ -93,6 +94,8 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_waits,
     check_awaited_states,
     check_environment,
+    check_hosts,
+    check_workers,
     check_channel_types,
     check_servers,
     check_qos_pairs,

@@ -22,6 +22,8 @@ WITHOUT = {
     'no-content-filter',
     # It is about the command line, not about a file.
     'nothing-to-check',
+    # Only `composer deploy` shows it.
+    'no-host',
     # It takes several files at once.
     'changes-nothing',
     # Only an installation without `rosidl_adapter` shows it.

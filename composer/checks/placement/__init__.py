@@ -1,0 +1,1 @@
+"""Where nodes and processes run: hosts, workers, and what crosses between them."""
