@@ -59,10 +59,16 @@ class Reading:
     path: DataPath
     node: NodeSpec | None = None
 
+    def keys_of(self, name: str) -> tuple[str, ...]:
+        """Return the keys of the file that a field may be under."""
+        # Those of a worker are its own, those of the system are under `executor`.
+        is_own = name == 'threads' and self.path
+        return (name,) if is_own else _KEYS.get(name, (name,))
+
     def find_span(self, name: str) -> Span:
         """Return where the value of a field is written, or the nearest around it that is."""
         positions = self.snapshot.positions
-        keys = _KEYS.get(name, (name,))
+        keys = self.keys_of(name)
         paths = [(*self.path, *key.split('.')) for key in keys]
         if name in _INHERITED:
             paths.append((*self.path[:-2], keys[0]))
@@ -121,7 +127,7 @@ def _compare_behaviours(old: Reading, new: Reading, name: str) -> Iterator[Chang
 def _change(
     old: Reading, new: Reading, name: str, before: Any, after: Any, *, is_code: bool = False
 ) -> Change:
-    key = _KEYS.get(name, (name,))[0]
+    key = new.keys_of(name)[0]
     return Change(key, before, after, old.find_span(name), new.find_span(name), is_code)
 
 

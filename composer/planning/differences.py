@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import ENTITY_KINDS
 from composer.language.bindings import exit_bindings, node_bindings
-from composer.language.specs import ComponentSpec, NodeSpec, ParameterSpec, ProcessSpec
+from composer.language.specs import (
+    ComponentSpec,
+    NodeSpec,
+    ParameterSpec,
+    ProcessSpec,
+    WorkerSpec,
+)
 from composer.names import expand_name, remap_name
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
@@ -26,6 +32,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Span
     from composer.entity_kinds import EntityKind
     from composer.language.bindings import Binding
+    from composer.language.specs import SystemSpec
     from composer.planning.plan import Target
     from composer.planning.snapshot import Snapshot
 
@@ -128,12 +135,18 @@ _COMPONENTS = _Rules(
         'a component takes this when it is loaded',
     ),
 )
+_WORKERS = _Rules(
+    'worker',
+    'the running process',
+    {'environment': 'a process takes this when it starts'},
+)
 _SYSTEM = _Rules(
     'system',
     'all that is not in the files',
     {
         'environment': 'ROS reads this when it starts',
         'interfaces': 'a process can load an interface package once',
+        **dict.fromkeys(('network', 'hosts'), 'the middleware reads this when it starts'),
     },
 )
 _OF_THE_SYSTEM = (
@@ -168,11 +181,13 @@ class _Comparison:
     def __init__(self, old: Snapshot, new: Snapshot) -> None:
         self._old, self._new = old, new
         self._stale = new.stale_modules(old)
+        self._renewed: set[str] = set()
         self._has_same_profiles = repr(old.spec.qos) == repr(new.spec.qos)
 
     def operations(self) -> Iterator[Operation]:
         yield from self.compare_system()
         old, new = self._old.spec, self._new.spec
+        yield from self._compare_workers()
         for name in dict.fromkeys([*old.processes, *new.processes]):
             process = (old.processes.get(name), new.processes.get(name))
             further = [*self._changed_code(*process)]
@@ -187,6 +202,16 @@ class _Comparison:
         after = {node.full_name: node for node in new.nodes.values()}
         for full_name in dict.fromkeys([*before, *after]):
             yield from self._compare_nodes(full_name, before.get(full_name), after.get(full_name))
+
+    def _compare_workers(self) -> Iterator[Operation]:
+        """Yield what is done to the workers, and learn which start anew."""
+        before, after = self._old.spec.workers, self._new.spec.workers
+        for name in dict.fromkeys([*before, *after]):
+            target = ('', 'workers', name)
+            for each in self._compare(_WORKERS, target, before.get(name), after.get(name)):
+                if each.action is Action.RECREATE:
+                    self._renewed.add(name)
+                yield each
 
     def _compare_components(
         self, old: ProcessSpec | None, new: ProcessSpec | None
@@ -231,6 +256,10 @@ class _Comparison:
     def compare_system(self) -> Iterator[Operation]:
         old, new = self._reading(self._old), self._reading(self._new)
         changes = [*compare_fields(old, new, _OF_THE_SYSTEM), *self._changed_packages(old, new)]
+        for key, values in (('network', _network_of), ('hosts', _addresses_of)):
+            changes += compare_entries(
+                old, new, key, *(values(each.record) for each in (old, new))
+            )
         if changes:
             target = ('', 'system', self._new.spec.name)
             span = self._new.positions.value(())
@@ -250,7 +279,8 @@ class _Comparison:
     def _compare_nodes(
         self, full_name: str, old: NodeSpec | None, new: NodeSpec | None
     ) -> Iterator[Operation]:
-        if new is not None and self._is_same(old, new):
+        is_renewed = old is not None and new is not None and new.worker in self._renewed
+        if new is not None and self._is_same(old, new) and not is_renewed:
             return
         further: list[Change] = []
         if old is not None and new is not None:
@@ -258,12 +288,25 @@ class _Comparison:
             further += compare_entries(*readings, 'state', old.state, new.state)
             further += self._changed_by_files(*readings)
             further += self._changed_classes(*readings)
-        own = list(self._compare(_NODES, (full_name, 'nodes', ''), old, new, further))
+        target = (full_name, 'nodes', '')
+        own = list(self._compare(_NODES, target, old, new, further))
+        if new is not None and is_renewed:
+            own = [self._renew(new, own)]
         yield from own if old is None else (with_notes(each, old, self._old) for each in own)
         if old is None or new is None or any(each.action is Action.RECREATE for each in own):
             return
         for kind in ENTITY_KINDS:
             yield from self._compare_entities(kind, old, new)
+
+    def _renew(self, node: NodeSpec, own: list[Operation]) -> Operation:
+        """Return what is done to a node that goes with its worker, whatever else changes in it."""
+        changes = own[0].changes if own else ()
+        reason = next((each.reason for each in own if each.reason), 'its worker starts anew')
+        span = self._new.positions.key(node.path)
+        target, lost = (node.full_name, 'nodes', ''), (_NODES.lost,)
+        return Operation(
+            Action.RECREATE, _NODES.noun, target, _name(node), span, changes, reason, lost
+        )
 
     def _is_same(self, old: NodeSpec | None, new: NodeSpec) -> bool:
         """Return whether a node was not read again, and all that it refers to is the same."""
@@ -430,11 +473,20 @@ def _reason_of_event(change: Change) -> str:
     return 'rclpy asks for an event when this is created' if is_event else ''
 
 
+def _reason_of_niceness(change: Change, rules: _Rules) -> str:
+    """Return why a worker cannot take a niceness: only a new process has less than it had."""
+    is_less = rules is _WORKERS and change.key == 'nice' and (change.new or 0) < (change.old or 0)
+    return 'a process cannot become less nice' if is_less else ''
+
+
 def _modification(
     rules: _Rules, target: Target, name: str, span: Span, changes: list[Change]
 ) -> Operation:
     reasons = (
-        rules.fixed.get(each.key) or rules.fixed.get(each.top_key) or _reason_of_event(each)
+        rules.fixed.get(each.key)
+        or rules.fixed.get(each.top_key)
+        or _reason_of_event(each)
+        or _reason_of_niceness(each, rules)
         for each in changes
         # Where a lifecycle starts counts from the next start.
         if not (each.key == 'lifecycle' and each.old and each.new)
@@ -456,6 +508,23 @@ def _modification(
     )
 
 
+def _network_of(spec: SystemSpec) -> dict[str, Any]:
+    """Return what the file says of the network, by its keys."""
+    network = spec.network
+    if network is None:
+        return {}
+    given = {each.name: getattr(network, each.name) for each in fields(network)}
+    return {
+        key: each for key, each in given.items() if each not in (None, '', ()) and key != 'path'
+    }
+
+
+def _addresses_of(spec: SystemSpec) -> dict[str, str]:
+    """Return the addresses at which the part of a host looks for the others."""
+    return {host.name: host.address for host in spec.hosts.values()} if spec.host else {}
+
+
 def _name(spec: Any) -> str:
     """Return the key under which something stands in the file."""
-    return str(spec.path[-1])
+    # A worker may have none, and only be named by a node.
+    return spec.name if isinstance(spec, WorkerSpec) else str(spec.path[-1])

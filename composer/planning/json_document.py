@@ -29,7 +29,9 @@ def _describe_operation(operation: Operation) -> dict[str, Any]:
         'action': operation.action.name.lower(),
         'kind': operation.noun,
         'name': operation.name,
-        'node': full_name if section not in ('components', 'processes', 'system') else None,
+        'node': full_name
+        if section not in ('components', 'processes', 'system', 'workers')
+        else None,
         'place': _describe_span(operation.span),
         'changes': [_describe_change(each) for each in operation.changes],
         'reason': operation.reason or None,
