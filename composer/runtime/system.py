@@ -143,9 +143,7 @@ class System:
         self._components.on_load = self._driver.begin_component
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
-        self._control = ControlNode(
-            self, spec, self._handle.health, self._hang_watcher.overdue_calls, commands
-        )
+        self._control = ControlNode(self, spec, self._handle.health, self._hang_watcher, commands)
 
     def _create_executor(self, **calls: Any) -> SystemExecutor:
         """Return what runs the callbacks.

@@ -28,10 +28,18 @@ STATUS: Final[Form] = {
 TOP: Final[Form] = {
     'period_sec': float,
     'has_cpu': bool,
+    'processes': [
+        {
+            'worker': str,
+            'pid': int,
+            **dict.fromkeys(('cpu', 'gil', 'gil_wait_mean_ms', 'gil_wait_max_ms'), _FIGURE),
+        }
+    ],
     'entities': [
         {
-            **dict.fromkeys(('node', 'kind', 'name', 'key'), str),
-            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued'), _FIGURE),
+            **dict.fromkeys(('node', 'worker', 'kind', 'name', 'key'), str),
+            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'queued'), _FIGURE),
+            **dict.fromkeys(('cpu', 'gil'), _FIGURE),
             **dict.fromkeys(('errors', 'dropped', 'late', 'skipped'), float),
             'delivery': (NoneType, str),
             'delivery_reason': str,

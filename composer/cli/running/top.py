@@ -13,7 +13,12 @@ import click
 from composer.cli.running import answer_forms
 from composer.cli.running.client import STATUS_SEC, Client
 from composer.cli.running.discovery import Discovery
-from composer.cli.running.top_table import render_entities, select_entities
+from composer.cli.running.top_table import (
+    describe_worst,
+    find_worst,
+    render_entities,
+    select_entities,
+)
 from composer.errors import ComposerError, ExitCode
 from composer.runtime.control import protocol
 
@@ -60,9 +65,11 @@ def _has_screen() -> bool:
 def _print(document: dict[str, Any], view: View, format_name: str) -> None:
     entities = select_entities(document['entities'], view)
     if format_name == 'json':
-        click.echo(json.dumps({**document, 'entities': entities}, indent=2))
+        found = {'gil_kept_by': find_worst(document), 'entities': entities}
+        click.echo(json.dumps({**document, **found}, indent=2))
     else:
-        click.echo('\n'.join(render_entities(entities)))
+        lines = map(describe_worst, find_worst(document))
+        click.echo('\n'.join([*render_entities(entities), *lines]))
 
 
 def _read(outcome: Outcome) -> dict[str, Any]:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from composer import signals
 from composer.cli.common.output import wants_colour
-from composer.cli.running.top_table import SORT_NAMES, View, render_entities, select_entities
+from composer.cli.running.top_table import (
+    SORT_NAMES,
+    View,
+    describe_worst,
+    find_worst,
+    render_entities,
+    select_entities,
+)
 from composer.terminal import escape
 
 if TYPE_CHECKING:
@@ -130,7 +137,8 @@ class _Screen:
             self._window.refresh()
             return
         entities = select_entities(document['entities'], self._view)
-        room = max(0, height - 3)
+        worst = [describe_worst(each) for each in find_worst(document)]
+        room = max(0, height - 3 - len(worst))
         self._top = max(0, min(self._top, len(entities) - room))
         header, *rows = render_entities(entities)
         self._write(0, self._describe(len(entities), len(document['entities'])))
@@ -139,6 +147,8 @@ class _Screen:
             zip(rows[self._top :][:room], entities[self._top :], strict=False), 2
         ):
             self._write(line, row, self._styles.get(entity['level'], 0))
+        for line, text in enumerate(worst, height - 1 - len(worst)):
+            self._write(line, text, self._styles.get('warn', 0))
         self._write(height - 1, _HELP, curses.A_DIM)
         self._window.refresh()
 

@@ -56,6 +56,7 @@ COLUMNS = (
     Column('P99 MS', _field('p99_ms'), _times),
     Column('MAX MS', _field('max_ms'), _times),
     Column('CPU', _field('cpu'), lambda value: f'{value:.1%}'),
+    Column('GIL', _field('gil'), lambda value: f'{value:.1%}'),
     Column('QUEUE', _field('queued'), str),
     Column('DROPPED', _field('dropped'), str),
     Column('LATE', _missed, str),
@@ -66,6 +67,9 @@ SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
 }
 DEFAULT_SORT = 'cpu'
+# A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
+_WAITED_MS = 0.5
+_KEPT_SHARE = 0.1
 
 
 @record
@@ -92,6 +96,45 @@ def select_entities(entities: Sequence[Mapping[str, Any]], view: View) -> list[M
     is_text = column in (COLUMNS[0], COLUMNS[-1])
     known.sort(key=column.value, reverse=is_text == view.is_reversed)
     return known + [each for each in shown if column.value(each) is None]
+
+
+def find_worst(document: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return which entities kept the interpreter (GIL) from others that waited for it.
+
+    Returns:
+        One at most for each process: `worker`, `node`, `entity`, its share `gil`, and how long
+        the others waited, `wait_mean_ms` and `wait_max_ms`.
+    """
+    return [worst for each in document['processes'] if (worst := _worst_of(document, each))]
+
+
+def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[str, Any] | None:
+    mates = [each for each in document['entities'] if each['worker'] == process['worker']]
+    known = [each for each in mates if each['gil'] is not None]
+    worst = max(known, key=lambda each: float(each['gil']), default=None)
+    if worst is None or worst['gil'] < _KEPT_SHARE:
+        return None
+    has_others = any(each['node'] != worst['node'] and each['calls'] for each in mates)
+    if not has_others or (process['gil_wait_mean_ms'] or 0.0) < _WAITED_MS:
+        return None
+    return {
+        'worker': worst['worker'],
+        'node': worst['node'],
+        'entity': _describe(worst).removeprefix(f'{worst["node"]}: '),
+        'gil': worst['gil'],
+        'wait_mean_ms': process['gil_wait_mean_ms'],
+        'wait_max_ms': process['gil_wait_max_ms'],
+    }
+
+
+def describe_worst(worst: Mapping[str, Any]) -> str:
+    """Return a line about one that `find_worst` returned."""
+    where = f' in worker {worst["worker"]}' if worst['worker'] else ''
+    return escape(
+        f'{worst["node"]}: {worst["entity"]} keeps the interpreter (GIL){where} '
+        f'{worst["gil"]:.0%} of the time: the others wait {worst["wait_mean_ms"]:.1f} ms for it '
+        f'on average, {worst["wait_max_ms"]:.1f} ms at most'
+    )
 
 
 def render_entities(entities: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from typing import TYPE_CHECKING, Any
 
 from composer.planning.snapshot_data import encode_snapshot
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from composer.planning.snapshot import Snapshot
+    from composer.runtime.costs.process_costs import ProcessCosts
     from composer.runtime.health.deliveries import Deliveries, Delivery
     from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
     from composer.runtime.health.statistics import EntityKey, EntityReport
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 _LEVELS = ('ok', 'warn', 'error')
 _P99 = 0.99
 _NS_PER_MS = 1e6
-_NS_PER_SEC = 1e9
 
 
 def status_answer(
@@ -61,11 +62,9 @@ def top_answer(
             'name': state.name,
             'period': latest.number,
             'period_sec': diagnostics.period_sec,
-            'has_cpu': latest.has_cpu,
-            'entities': [
-                _describe_entity(key, report, has_cpu=latest.has_cpu)
-                for key, report in latest.by_entity.items()
-            ]
+            'has_cpu': latest.costs is not None,
+            'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
+            'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
             + [_describe_delivery(key, each) for key, each in deliveries.items()]
             + [
                 _describe_figureless((node, Owner('lifecycle', each)), None, '')
@@ -94,13 +93,14 @@ def _summarize(diagnostics: DiagnosticsPublisher) -> dict[str, str]:
     return {'level': _LEVELS[worst], 'message': message}
 
 
-def _describe_entity(key: EntityKey, report: EntityReport, *, has_cpu: bool) -> dict[str, Any]:
+def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
     node, owner = key
     times, missed = report.times, report.all_missed
     calls = times.calls()
     level, message = _find_level(report)
     return {
         'node': node,
+        'worker': '',
         'kind': owner.kind,
         'name': owner.name,
         'key': owner.key,
@@ -110,7 +110,8 @@ def _describe_entity(key: EntityKey, report: EntityReport, *, has_cpu: bool) -> 
         'mean_ms': times.mean_ns() / _NS_PER_MS if calls else None,
         'p99_ms': times.percentile_ns(_P99) / _NS_PER_MS if calls else None,
         'max_ms': times.most_ns / _NS_PER_MS if calls else None,
-        'cpu': times.cpu_ns / _NS_PER_SEC / report.period_sec if has_cpu else None,
+        'cpu': report.cpu,
+        'gil': report.kept,
         'queued': report.queued,
         'calls': report.all_calls,
         'errors': report.all_errors,
@@ -128,10 +129,11 @@ def _describe_delivery(key: EntityKey, delivery: Delivery) -> dict[str, Any]:
 
 def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[str, Any]:
     node, owner = key
-    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
+    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'gil', 'queued')
     none = ('calls', 'errors', 'dropped', 'late', 'skipped')
     return {
         'node': node,
+        'worker': '',
         'kind': owner.kind,
         'name': owner.name,
         'key': owner.key,
@@ -141,6 +143,19 @@ def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[s
         **dict.fromkeys(none, 0),
         'delivery': way,
         'delivery_reason': reason,
+    }
+
+
+def _describe_process(costs: ProcessCosts) -> dict[str, Any]:
+    """Return what a process costs as a whole."""
+    waits = costs.waits
+    return {
+        'worker': '',
+        'pid': os.getpid(),
+        'cpu': costs.cpu,
+        'gil': costs.held,
+        'gil_wait_mean_ms': None if waits is None else waits.mean_ms,
+        'gil_wait_max_ms': None if waits is None else waits.max_ms,
     }
 
 

@@ -21,18 +21,17 @@ from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
-from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
+from composer.runtime.health.diagnostics_publisher import CallWatcher, DiagnosticsPublisher
 from composer.runtime.health.system_state import Outcome, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from rclpy.context import Context
 
     from composer.language.specs import SystemSpec
-    from composer.runtime.behaviours.running_calls import RunningCall
     from composer.runtime.control.control_services import Commands, ControlledSystem
     from composer.runtime.health.statistics import HealthRegistry
 
@@ -48,7 +47,7 @@ class ControlNode:
 
     Args:
         health: The health of the system's entities.
-        overdue_calls: Returns the calls that exceed their `warn_after`.
+        calls: Knows the calls that run.
         commands: `None` if the system is not to be asked over ROS.
     """
 
@@ -57,13 +56,13 @@ class ControlNode:
         system: ControlledSystem,
         spec: SystemSpec,
         health: HealthRegistry,
-        overdue_calls: Callable[[], list[tuple[str, RunningCall]]],
+        calls: CallWatcher,
         commands: Commands | None,
     ) -> None:
         self._system = system
         self._commands = commands
         self._health = health
-        self._overdue_calls = overdue_calls
+        self._calls = calls
         self._period_sec = spec.diagnostics_period_sec
         self._diagnostics: DiagnosticsPublisher | None = None
         self._services: ControlServices | None = None
@@ -179,7 +178,7 @@ class ControlNode:
                 self._system.state,
                 period_sec,
                 self._health,
-                self._overdue_calls,
+                self._calls,
                 self._system.find_deliveries,
             )
             try:

@@ -14,6 +14,7 @@ from composer.entity_kinds import KIND_OF_NOUN
 
 if TYPE_CHECKING:
     from composer.runtime.behaviours.running_calls import Owner
+    from composer.runtime.costs.process_costs import ProcessCosts
     from composer.runtime.health.deliveries import Delivery
     from composer.runtime.health.statistics import EntityReport
     from composer.runtime.health.system_state import SystemState
@@ -48,9 +49,16 @@ class StatusWriter:
             self._set('callback time mean (ms)', f'{times.mean_ns() / 1e6:.4f}')
             self._set('callback time p99 (ms)', f'{times.percentile_ns(_P99) / 1e6:.4f}')
             self._set('callback time max (ms)', f'{times.most_ns / 1e6:.4f}')
+        self._set_share('cpu (%)', report.cpu)
+        self._set_share('GIL (%)', report.kept)
         for label, attribute in self._missed.items():
             self._set(label, str(getattr(report.all_missed, attribute)))
         return status
+
+    def _set_share(self, key: str, share: float | None) -> None:
+        """Set a share in percent; once it was known, it may be unknown again."""
+        if share is not None or key in self._values:
+            self._set(key, format_percent(share))
 
     def _set(self, key: str, value: str) -> None:
         pair = self._values.get(key)
@@ -58,6 +66,11 @@ class StatusWriter:
             pair = self._values[key] = KeyValue(key=key)
             self._status.values.append(pair)
         pair.value = value
+
+
+def format_percent(share: float | None) -> str:
+    """Return a share in percent; empty if it is not known."""
+    return '' if share is None else f'{share * 100:.2f}'
 
 
 def summarize_report(report: EntityReport) -> tuple[bytes, str]:
@@ -112,11 +125,14 @@ def _name(node: str, owner: Owner) -> str:
     return f'{node}: {task}'
 
 
-def system_status(node: str, state: SystemState) -> DiagnosticStatus:
+def system_status(
+    node: str, state: SystemState, costs: ProcessCosts | None = None
+) -> DiagnosticStatus:
     """Return the status of a system itself.
 
     Args:
         node: The full name of its control node.
+        costs: What its process costs, if that was measured.
     """
     last = state.last_reload
     values = {
@@ -125,6 +141,7 @@ def system_status(node: str, state: SystemState) -> DiagnosticStatus:
         'uptime (s)': f'{state.uptime_sec:.0f}',
         'last reload': '' if last is None else last.outcome.text,
         'last error': state.last_error,
+        **({} if costs is None else _describe_costs(costs)),
     }
     return DiagnosticStatus(
         name=f'{node}: system',
@@ -133,6 +150,16 @@ def system_status(node: str, state: SystemState) -> DiagnosticStatus:
         message=f'{state.word}; the last reload failed' if state.last_error else state.word,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
+
+
+def _describe_costs(costs: ProcessCosts) -> dict[str, str]:
+    waits = costs.waits
+    return {
+        'cpu (%)': format_percent(costs.cpu),
+        'GIL (%)': format_percent(costs.held),
+        'GIL wait mean (ms)': '' if waits is None else f'{waits.mean_ms:.3f}',
+        'GIL wait max (ms)': '' if waits is None else f'{waits.max_ms:.3f}',
+    }
 
 
 def _count(number: int, what: str, more: str = '') -> str:

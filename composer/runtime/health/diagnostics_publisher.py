@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import threading
 from time import monotonic, monotonic_ns
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.records import record
-from composer.runtime.health.statistics import cpu_meter
+from composer.runtime.costs.call_meter import call_meter
+from composer.runtime.costs.process_costs import ProcessMeter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.runtime.behaviours.running_calls import RunningCall
+    from composer.runtime.costs.process_costs import ProcessCosts
     from composer.runtime.health.deliveries import Deliveries
     from composer.runtime.health.statistics import EntityKey, EntityReport, HealthRegistry
     from composer.runtime.health.system_state import SystemState
@@ -35,12 +37,22 @@ class Reports:
 
     Attributes:
         number: Counts the periods.
-        has_cpu: Whether it was measured what calls cost the processor.
+        costs: Those of the process; `None` if it was not measured what calls cost.
     """
 
     number: int
-    has_cpu: bool
+    costs: ProcessCosts | None
     by_entity: Mapping[EntityKey, EntityReport]
+
+
+class CallWatcher(Protocol):
+    """Knows the calls that run."""
+
+    def overdue_calls(self) -> Iterable[tuple[str, RunningCall]]:
+        """Return the calls that exceed their `warn_after`, with their nodes' full names."""
+
+    def running_calls(self) -> Iterable[tuple[str, RunningCall]]:
+        """Return all calls, with their nodes' full names."""
 
 
 class DiagnosticsPublisher:
@@ -49,7 +61,6 @@ class DiagnosticsPublisher:
     Args:
         state: The state of the system itself.
         period_sec: Seconds between two messages.
-        overdue: Returns the calls that exceed their `warn_after`, with their nodes' full names.
         find_deliveries: Returns which way publishers and clients deliver.
 
     Attributes:
@@ -61,15 +72,16 @@ class DiagnosticsPublisher:
         state: SystemState,
         period_sec: float,
         registry: HealthRegistry,
-        overdue: Callable[[], Iterable[tuple[str, RunningCall]]],
+        calls: CallWatcher,
         find_deliveries: Callable[[], Deliveries],
     ) -> None:
         self._find_deliveries = find_deliveries
-        self.latest = Reports(0, has_cpu=False, by_entity={})
+        self.latest = Reports(0, None, {})
         self.period_sec = period_sec
         self._state = state
         self._registry = registry
-        self._overdue = overdue
+        self._calls = calls
+        self._meter = ProcessMeter()
         self._watched_until = 0.0
         self._has_ended = False
         self._woken = threading.Event()
@@ -93,7 +105,7 @@ class DiagnosticsPublisher:
         self._woken.set()
         if self._thread.ident is not None:
             self._thread.join()
-            cpu_meter.turn(on=False)
+            call_meter.turn(on=False)
             self._node.destroy_publisher(self._publisher)
 
     def change_period(self, period_sec: float) -> None:
@@ -103,7 +115,7 @@ class DiagnosticsPublisher:
             self._woken.set()
 
     def watch(self) -> None:
-        """Measure for some time what calls cost the processor, from the next period on."""
+        """Measure for some time what calls cost, from the next period on."""
         self._watched_until = monotonic() + _WATCHED_SEC
 
     def _run(self) -> None:
@@ -125,15 +137,16 @@ class DiagnosticsPublisher:
                 due = monotonic() + self.period_sec
                 continue
             now = monotonic()
-            reports = self._registry.reports(now - begun, self._overdue(), monotonic_ns())
+            latest = self.latest = self._take_reports(now - begun)
             begun = now
-            self.latest = Reports(self.latest.number + 1, cpu_meter.is_on, reports)
-            cpu_meter.turn(on=now < self._watched_until)
             due = max(due, now) + self.period_sec
-            if not self._publisher.get_subscription_count():
+            is_heard = bool(self._publisher.get_subscription_count())
+            self._measure_calls(on=is_heard or now < self._watched_until)
+            if not is_heard:
                 continue
-            statuses = [system_status(self._node.get_fully_qualified_name(), self._state)]
-            for key, report in reports.items():
+            name = self._node.get_fully_qualified_name()
+            statuses = [system_status(name, self._state, latest.costs)]
+            for key, report in latest.by_entity.items():
                 if key not in writers:
                     writers[key] = StatusWriter(*key, self._state.name)
                 statuses.append(writers[key].write(report))
@@ -150,3 +163,20 @@ class DiagnosticsPublisher:
                 message: Any = DiagnosticArray(status=statuses[start : start + _MOST_STATUSES])
                 message.header.stamp = stamp
                 self._publisher.publish(message)
+
+    def _take_reports(self, period_sec: float) -> Reports:
+        """Return the health in the period that ends."""
+        costs = None
+        if call_meter.is_on:
+            self._registry.add_costs(self._calls.running_calls())
+            costs = self._meter.take(period_sec)
+        sampled_ns = None if costs is None else costs.sampled_ns
+        reports = self._registry.reports(
+            period_sec, self._calls.overdue_calls(), monotonic_ns(), sampled_ns
+        )
+        return Reports(self.latest.number + 1, costs, reports)
+
+    def _measure_calls(self, *, on: bool) -> None:
+        if on and not call_meter.is_on:
+            self._meter.begin()
+        call_meter.turn(on=on)

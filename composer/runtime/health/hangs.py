@@ -152,6 +152,14 @@ class HangWatcher(Watcher):
             if (limit := node.limits.get(call.owner)) is not None and limit.is_exceeded_by(call)
         ]
 
+    def running_calls(self) -> list[tuple[str, RunningCall]]:
+        """Return the calls that run now, with their nodes' full names."""
+        return [
+            (full_name, call)
+            for full_name, node in list(self._nodes.items())
+            for call in node.running.calls()
+        ]
+
     def _check_calls(self) -> None:
         for node in list(self._nodes.values()):
             for token, entry in list(node.running.entries.items()):

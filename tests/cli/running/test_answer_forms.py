@@ -30,6 +30,8 @@ ENTITY = {
     'key': '',
     'queued': 0,
     'cpu': None,
+    'gil': 0.5,
+    'worker': '',
     'mean_ms': 1.0,
     'p99_ms': 1.0,
     'max_ms': 1.0,
@@ -41,7 +43,21 @@ ENTITY = {
     'delivery': None,
     'delivery_reason': '',
 }
-TOP_ANSWER = {'version': 1, 'period_sec': 1, 'has_cpu': False, 'entities': [ENTITY]}
+PROCESS = {
+    'worker': '',
+    'pid': 1,
+    'cpu': 0.5,
+    'gil': None,
+    'gil_wait_mean_ms': 0.1,
+    'gil_wait_max_ms': 0.2,
+}
+TOP_ANSWER = {
+    'version': 1,
+    'period_sec': 1,
+    'has_cpu': False,
+    'processes': [PROCESS],
+    'entities': [ENTITY],
+}
 # What stands in place of a value, as JSON.
 WRONG = ('{}', '[]', '[null]', '"\\u001b"', 'true', 'NaN', '1e400', '1' + 20 * '0', '[' * 100000)
 

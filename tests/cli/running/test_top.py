@@ -12,7 +12,13 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run
-from composer.cli.running.top_table import View, render_entities, select_entities
+from composer.cli.running.top_table import (
+    View,
+    describe_worst,
+    find_worst,
+    render_entities,
+    select_entities,
+)
 from tests.running import ROOT
 
 SYSTEM = """
@@ -43,17 +49,53 @@ def hear(node, message):
 """
 
 
+HOG_SYSTEM = """
+version: 1
+diagnostics: {period: 0.5}
+nodes:
+  hog: {timers: {loop: {rate: 50, behaviour: parts:loop}}}
+  polite: {timers: {hash: {rate: 50, behaviour: parts:digest}}}
+"""
+HOG_CODE = """
+import hashlib
+import time
+
+DATA = bytes(10_000_000)
+
+def loop(node):
+    end = time.monotonic() + 0.05
+    while time.monotonic() < end:
+        pass
+
+def digest(node):
+    hashlib.sha256(DATA)
+"""
+
+
 def entity(node, name, **figures):
-    known = dict.fromkeys(('mean_ms', 'p99_ms', 'max_ms', 'cpu'))
-    counts = dict.fromkeys(('rate_hz', 'queued', 'dropped', 'late', 'skipped', 'errors'), 0)
+    known = dict.fromkeys(('mean_ms', 'p99_ms', 'max_ms', 'cpu', 'gil'))
+    counts = dict.fromkeys(
+        ('rate_hz', 'calls', 'queued', 'dropped', 'late', 'skipped', 'errors'), 0
+    )
     way = {'delivery': None, 'delivery_reason': ''}
-    owner = {'node': node, 'kind': 'timer', 'name': name, 'key': ''}
+    owner = {'node': node, 'worker': '', 'kind': 'timer', 'name': name, 'key': ''}
     return {**owner, **known, **counts, **way, **figures}
 
 
 ENTITIES = [
-    entity('/b', 'slow', cpu=0.01, mean_ms=20.0, p99_ms=21.0, max_ms=22.5, late=2, skipped=1),
-    entity('/a', 'fast', cpu=0.5, rate_hz=1000.0, errors=7),
+    entity(
+        '/b',
+        'slow',
+        cpu=0.01,
+        gil=0.005,
+        calls=9,
+        mean_ms=20.0,
+        p99_ms=21.0,
+        max_ms=22.5,
+        late=2,
+        skipped=1,
+    ),
+    entity('/a', 'fast', cpu=0.5, gil=0.75, rate_hz=1000.0, errors=7),
     entity('/a', 'new'),
 ]
 
@@ -76,11 +118,63 @@ def test_entities_are_sorted_and_filtered(view, names):
 
 def test_figures_stand_to_the_right():
     assert '\n'.join(render_entities(ENTITIES)) == (
-        'ENTITY          RATE/S  MEAN MS  P99 MS  MAX MS    CPU  QUEUE  DROPPED  LATE  ERRORS  DELIVERY\n'
-        '/b: timer slow     0.0   20.000  21.000  22.500   1.0%      0        0     3       0         -\n'
-        '/a: timer fast  1000.0        -       -       -  50.0%      0        0     0       7         -\n'
-        '/a: timer new      0.0        -       -       -      -      0        0     0       0         -'
+        'ENTITY          RATE/S  MEAN MS  P99 MS  MAX MS    CPU    GIL  QUEUE  DROPPED  LATE  ERRORS  DELIVERY\n'
+        '/b: timer slow     0.0   20.000  21.000  22.500   1.0%   0.5%      0        0     3       0         -\n'
+        '/a: timer fast  1000.0        -       -       -  50.0%  75.0%      0        0     0       7         -\n'
+        '/a: timer new      0.0        -       -       -      -      -      0        0     0       0         -'
     )
+
+
+def process(worker='', **figures):
+    waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
+    return {'worker': worker, 'pid': 1, 'cpu': 1.0, 'gil': 0.9, **waits, **figures}
+
+
+def test_the_entity_is_named_that_keeps_the_interpreter_from_others():
+    (worst,) = find_worst({'processes': [process()], 'entities': ENTITIES})
+    assert describe_worst(worst) == (
+        '/a: timer fast keeps the interpreter (GIL) 75% of the time: '
+        'the others wait 1.2 ms for it on average, 20.0 ms at most'
+    )
+
+
+@pytest.mark.parametrize(
+    ('processes', 'entities'),
+    [
+        ([], ENTITIES),
+        ([process(gil_wait_mean_ms=0.1)], ENTITIES),
+        ([process(gil_wait_mean_ms=None)], ENTITIES),
+        ([process()], ENTITIES[1:]),
+        ([process()], ENTITIES[::2]),
+        ([process(worker='other')], ENTITIES),
+    ],
+    ids=['unmeasured', 'no wait', 'unknown wait', 'alone', 'idle', 'elsewhere'],
+)
+def test_nobody_is_named_who_keeps_no_other_waiting(processes, entities):
+    assert find_worst({'processes': processes, 'entities': entities}) == []
+
+
+def test_each_worker_has_its_own_worst():
+    mates = [{**each, 'worker': 'eyes', 'gil': (each['gil'] or 0) / 2} for each in ENTITIES]
+    processes = [process(), process('eyes')]
+    found = find_worst({'processes': processes, 'entities': [*ENTITIES, *mates]})
+    assert [(each['worker'], each['gil']) for each in found] == [('', 0.75), ('eyes', 0.375)]
+    assert '(GIL) in worker eyes 38% of' in describe_worst(found[1])
+
+
+@pytest.mark.ros
+def test_the_node_is_named_whose_callbacks_keep_the_interpreter(compose, capsys):
+    compose(HOG_SYSTEM, HOG_CODE).wait_until_ready()
+    assert run(['top', '--once', '--format', 'json']) == 0
+    document = json.loads(capsys.readouterr()[0])
+    found = {each['node']: each for each in document['entities']}
+    # What computes in C without the interpreter keeps it from nobody.
+    assert found['/hog']['gil'] > 0.5
+    assert found['/polite']['gil'] < 0.3
+    assert [(each['node'], each['entity']) for each in document['gil_kept_by']] == [
+        ('/hog', 'timer loop')
+    ]
+    assert document['processes'][0]['gil'] >= found['/hog']['gil']
 
 
 @pytest.mark.ros
@@ -139,7 +233,7 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
 
     assert '/arm: timer busy' in shows('system: 3 of 3 entities, by cpu', '%').splitlines()[2]
     terminal('send-keys', 'Right', 'r')
-    shows('by queue, reversed')
+    shows('by gil, reversed')
     terminal('send-keys', '/', 'e', 'a', 'r', 'Enter')
     screen = shows('system: 1 of 3 entities', 'filter: ear', '/robot/ear: subscription numbers')
     assert 'busy' not in screen

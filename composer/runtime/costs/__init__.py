@@ -1,0 +1,1 @@
+"""What calls cost: processor time, and how long they keep the interpreter from the others."""
