@@ -44,7 +44,7 @@ from composer.checks.references import (
     check_types,
 )
 from composer.checks.repeated import say_once
-from composer.diagnostics import errors_first
+from composer.diagnostics import errors_first, has_errors
 from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
@@ -107,6 +107,18 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_remap_rules,
     check_typos,
 )
+# These look at the computer that the system runs on.
+_LOCAL_RULES = {
+    *NODE_RULES,
+    *(check_executables, check_launch_files, check_parameter_files, check_start_values),
+    check_environment,
+}
+# These look at the computer that the system runs on, or at a node alone.
+_LOCAL_RULES = {
+    *NODE_RULES,
+    *(check_executables, check_launch_files, check_parameter_files, check_start_values),
+    check_environment,
+}
 # One more than is shown, as a sign that there are more.
 _ENOUGH = MAX_FINDINGS + 1
 # What only some runs look at.
@@ -142,12 +154,17 @@ def check_system(
 
 
 def check_in_context(
-    system: LoadedSystem, context: CheckContext | None, further: FurtherChecks | None = None
+    system: LoadedSystem,
+    context: CheckContext | None,
+    further: FurtherChecks | None = None,
+    host: str = '',
 ) -> list[Diagnostic]:
     """Return the findings in a system as `check_system` does, for a context that exists.
 
     Args:
         context: What `create_context` returned for the system.
+        host: The host whose part is to run here, if it is not the whole system. Of the rest, only
+            errors in how it is connected are found: its files and packages may be elsewhere.
     """
     found: list[Diagnostic] = []
     declared: Sequence[Diagnostic] = ()
@@ -156,7 +173,7 @@ def check_in_context(
     if context:
         declared = context.interfaces.findings
         unchecked |= set() if context.catalogue.available else {'interfaces'}
-        found += _apply_rules(context, comments)
+        found += _apply_rules(context, comments, host)
     if context and further:
         samples = _by_line(system.sampled)
         for check in further.values():
@@ -164,9 +181,9 @@ def check_in_context(
             found += [each for each in more if not _hangs_on_samples(each, samples)]
     # What several entries share through an alias, or a file included twice, is wrong once.
     every = [*system.diagnostics, *declared, *found]
-    once = {(each.rule, each.span, each.file, each.message): each for each in reversed(every)}
+    once = {_identify(each): each for each in reversed(every)}
     heard = [each for each in once.values() if not comments.silence(each)]
-    knows_all = not system.diagnostics and len(heard) < _ENOUGH
+    knows_all = not (system.diagnostics or host) and len(heard) < _ENOUGH
     heard += islice(comments.check(unchecked if knows_all else None), _ENOUGH)
     return _first_of(say_once(sorted(heard, key=lambda finding: finding.sort_key), system))
 
@@ -178,13 +195,29 @@ def _first_of(findings: list[Diagnostic]) -> list[Diagnostic]:
     return [*shown[:-1], replace(shown[-1], help=_MORE)]
 
 
-def _apply_rules(context: CheckContext, comments: IgnoreComments) -> Iterator[Diagnostic]:
+def _identify(finding: Diagnostic) -> tuple[object, ...]:
+    return finding.rule, finding.span, finding.file, finding.message
+
+
+def _apply_rules(
+    context: CheckContext, comments: IgnoreComments, host: str
+) -> Iterator[Diagnostic]:
     samples = _by_line(context.system.sampled)
+    part = context.on_host(host) if host else None
     for rule in (*NODE_RULES, *SYSTEM_RULES):
-        yield from _apply(rule, context, samples, comments)
+        found = _apply(rule, context, samples, comments)
+        if part is None:
+            yield from found
+        elif rule in _LOCAL_RULES:
+            # The part alone lacks nodes that its own may refer to.
+            here = {*map(_identify, _apply(rule, part, samples, comments))}
+            yield from (each for each in found if _identify(each) in here)
+        else:
+            yield from (each for each in found if has_errors([each]))
     if context.system.unused is not None:
         # What is left out this time may be there the next.
-        other = replace(context, spec=context.system.unused)
+        unused = context.system.unused
+        other = replace(context, spec=unused.on_host(host) if host else unused)
         samples = _by_line((*context.system.sampled, *context.system.sampled_unused))
         for rule in NODE_RULES:
             yield from _apply(rule, other, samples, comments)

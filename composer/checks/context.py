@@ -42,6 +42,10 @@ class CheckContext:
     interfaces: DeclaredPackages
     modules: ModuleFinder
 
+    def on_host(self, host: str) -> CheckContext:
+        """Return the context of the part that a host runs."""
+        return replace(self, spec=self.spec.on_host(host))
+
     @cached_property
     def topology(self) -> Topology:
         """What connects the nodes."""

@@ -189,6 +189,8 @@ def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diag
 def check_start_values(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that the programs and files exist that values come from; they are not run or read."""
     for value in context.system.start.found:
+        if value.is_elsewhere(context.spec.host):
+            continue
         if value.command:
             yield from _check_command(value)
         else:

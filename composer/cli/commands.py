@@ -18,6 +18,7 @@ from composer.cli.common.argument_types import (
     refuse_options,
     refuse_together,
     split_words,
+    takes_host,
     takes_settings,
     takes_system,
     takes_topics,
@@ -88,6 +89,7 @@ def cli(context: click.Context) -> int:
     help='Set the log level (debug, info, warn, error or fatal) of all nodes, or of one. '
     'Overrides the file. Can be repeated.',
 )
+@takes_host
 @click.option(
     '--watch', 'watches', is_flag=True, help='Change the running system when its files change.'
 )
@@ -124,6 +126,7 @@ def up_command(  # noqa: PLR0913 - one for each option
     words: tuple[str, ...],
     set_values: tuple[str, ...],
     log_levels: tuple[str, ...],
+    host: str,
     *,
     watches: bool,
     detaches: bool,
@@ -153,6 +156,7 @@ def up_command(  # noqa: PLR0913 - one for each option
 
         options = [f'--set={each}' for each in set_values]
         options += [f'--log-level={each}' for each in log_levels]
+        options += [f'--host={host}'] * bool(host)
         options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
         options += [f'--record={record}'] * (record is not None)
         options += [f'--topics={each}' for each in topics]
@@ -163,6 +167,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         context.obj,
         log_levels,
         set_values,
+        host=host,
         watches=watches,
         is_asked=is_asked,
         recording=RecordingOptions(record, topics),
@@ -375,6 +380,7 @@ def show_command(
     help='Change both systems by this file. Can be repeated.',
 )
 @takes_settings
+@takes_host
 @click.option(
     '--format',
     'format_name',
@@ -393,6 +399,7 @@ def plan_command(
     words: tuple[str, ...],
     layers: tuple[Path, ...],
     set_values: tuple[str, ...],
+    host: str,
     format_name: str,
     *,
     tells_difference: bool,
@@ -414,6 +421,7 @@ def plan_command(
         arguments,
         set_values,
         layers=layers,
+        host=host,
         format_name=format_name,
         tells_difference=tells_difference,
     )

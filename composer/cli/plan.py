@@ -10,6 +10,7 @@ import click
 from composer import confidential
 from composer.checks.checker import check_in_context, create_context
 from composer.cli.common.file_selection import load_given
+from composer.cli.common.host_part import find_part
 from composer.cli.common.output import show_findings, wants_colour
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
@@ -36,6 +37,7 @@ def plan(
     set_values: Sequence[str],
     *,
     layers: Sequence[Path],
+    host: str = '',
     format_name: str,
     tells_difference: bool,
 ) -> int:
@@ -47,11 +49,12 @@ def plan(
         words: Values for the arguments that both files declare.
         set_values: Values to change in both.
         layers: Files that change both.
+        host: The host whose parts are compared; empty for the whole systems.
         format_name: `text` or `json`.
         tells_difference: Whether the exit code is 2 if there is any.
 
     Raises:
-        UsageError: There are more files, or the arguments or `--set` do not fit them.
+        UsageError: There are more files, or the arguments, `--set` or the host do not fit them.
         ComposerError: No such system runs.
     """
     if len(paths) > 2:  # noqa: PLR2004
@@ -63,7 +66,8 @@ def plan(
     for path in paths:
         is_new = path is paths[-1]
         before = next(filter(None, contexts), None)
-        context, found = _read([path, *layers], words, set_values, before, checks=is_new)
+        given = [path, *layers], words, set_values
+        context, found = _read(*given, before, host, checks=is_new)
         contexts.append(context)
         # Both may have one, as of a layer.
         findings += [each for each in found if each not in findings]
@@ -72,7 +76,11 @@ def plan(
     show_findings(findings)
     if has_errors(findings):
         return ExitCode.FAILED
-    old, *more = filter(None, contexts)
+    read = [each for each in contexts if each]
+    if host:
+        # Only the new one must have something there.
+        read = [*(each.on_host(host) for each in read[:-1]), find_part(read[-1], host)]
+    old, *more = read
     result = (
         compare(take_snapshot(old), take_snapshot(more[0])) if more else _compare_with_running(old)
     )
@@ -93,7 +101,7 @@ def _compare_with_running(context: CheckContext) -> Plan:
 
     # They say on which graph it runs.
     with environment_set(context.spec.environment), Client() as client:
-        system = Discovery(client).find(context.spec.name)
+        system = Discovery(client).find(context.spec.running_name)
         answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
     old = decode_snapshot(read_answer(answer.text))
     new = take_snapshot(context, [Path(each) for each in old.prefixes])
@@ -106,11 +114,13 @@ def _read(
     words: Sequence[str],
     set_values: Sequence[str],
     before: CheckContext | None,
+    host: str,
     *,
     checks: bool,
 ) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
     """Return the context of a system, and what was found in it."""
     before_system = before.system if before else None
-    system = load_given(paths, words, set_values, before_system, StartValueReader())
+    system = load_given(paths, words, set_values, before_system, StartValueReader(host))
     context = create_context(system, InterfaceCatalogue(), before)
-    return context, check_in_context(system, context) if checks else system.diagnostics
+    findings = check_in_context(system, context, host=host) if checks else system.diagnostics
+    return context, findings

@@ -18,6 +18,7 @@ from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
+from composer.language.values.start_reader import StartValueReader
 from composer.planning.snapshot import take_snapshot
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
@@ -40,6 +41,7 @@ def up(  # noqa: PLR0913 - one for each option
     log_levels: Sequence[str] = (),
     set_values: Sequence[str] = (),
     *,
+    host: str = '',
     watches: bool = False,
     is_asked: bool = True,
     recording: RecordingOptions | None = None,
@@ -54,6 +56,7 @@ def up(  # noqa: PLR0913 - one for each option
         ros_arguments: As after `--ros-args` on a command line.
         log_levels: `debug` for all nodes, `talker:=debug` for one.
         set_values: Values to change, as in `nodes.talker.log_level=debug`.
+        host: The host whose part runs here; empty for the whole system.
         watches: Whether edits of the files change the running system.
         is_asked: Whether the system serves what `composer reload` and the like ask.
         recording: What is recorded of it; `None` for nothing.
@@ -76,7 +79,7 @@ def up(  # noqa: PLR0913 - one for each option
         raise UsageError(message, help='give a file')
     if ends_process:
         note_start()
-    reader = SystemReader(paths, words, set_values)
+    reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
     begun_ns = time_ns()
     context, _files, told = reader.read()
     report = _show_errors if rehearses else show_findings

@@ -753,6 +753,11 @@ class SystemSpec:
     network: NetworkSpec | None
     host: str = ''
 
+    @property
+    def running_name(self) -> str:
+        """Its name where systems that run are listed: parts have that of their host in it."""
+        return f'{self.name}@{self.host}' if self.host else self.name
+
     def on_host(self, name: str) -> SystemSpec:
         """Return the part of the system that runs on a host."""
         return replace(

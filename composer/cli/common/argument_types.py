@@ -46,6 +46,17 @@ def takes_settings(command: _Command) -> _Command:
     return set_option(command)
 
 
+def takes_host(command: _Command) -> _Command:
+    """Add `--host` to a command."""
+    host_option = click.option(
+        '--host',
+        metavar='NAME',
+        default='',
+        help='Only the part that this host runs, of a system for several.',
+    )
+    return host_option(command)
+
+
 def takes_topics(command: _Command) -> _Command:
     """Add `--topics` to a command."""
     topics_option = click.option(

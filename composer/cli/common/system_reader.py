@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
 from composer.cli.common.file_selection import create_loader
+from composer.cli.common.host_part import find_part
 from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -38,12 +39,14 @@ class SystemReader:
         paths: The file and its layers.
         words: Values for the arguments that the file declares.
         set_values: Values to change.
+        host: The host whose part runs here; empty for the whole system.
         reader: Reads the values that are known when the system starts.
     """
 
     paths: Sequence[Path]
     words: Sequence[str]
     set_values: Sequence[str]
+    host: str = ''
     reader: StartValueReader = field(default_factory=StartValueReader)
 
     def check(self, report: Report = show_findings) -> CheckContext | None:
@@ -64,23 +67,27 @@ class SystemReader:
     ) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
         """Return a system, if there is one, the files that it names, and what is wrong with it.
 
+        With `host`, it is the part that runs there, of a system that is read as a whole.
+
         Args:
             before: What was read before: what is the same in it is kept.
 
         Raises:
-            UsageError: The arguments do not fit the file.
+            UsageError: The arguments do not fit the file, or nothing of it runs on the host.
             StartValueError: A value that is known when the system starts cannot be read.
         """
         system_before = before.system if before else None
         load = create_loader(self.paths, self.words, self.set_values, system_before)
         system = load()
         context = create_context(system, InterfaceCatalogue(), before)
-        findings = check_in_context(system, context)
+        findings = check_in_context(system, context, host=self.host)
         if system.start.found and not has_errors(findings):
             # No command is run for a system with errors.
             system = load(read_value=self.reader.read)
             context = create_context(system, InterfaceCatalogue(), before)
-            findings = check_in_context(system, context)
+            findings = check_in_context(system, context, host=self.host)
+        if context and self.host and not has_errors(findings):
+            context = find_part(context, self.host)
         named = list_files(context) if context else {*system.files, *system.named}
         return context, [*self.paths, *named], findings
 

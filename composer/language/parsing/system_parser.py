@@ -18,6 +18,7 @@ from composer.language.parsing.entry_parser import Data, Spec, parse_entries, pa
 from composer.language.parsing.node_parser import parse_node
 from composer.language.parsing.process_parser import parse_process
 from composer.language.parsing.worker_parser import (
+    create_host_finder,
     parse_hosts,
     parse_network,
     parse_workers,
@@ -35,6 +36,7 @@ from composer.yaml_text.scalars import format_scalar
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from composer.diagnostics import Span
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import ProcessSpec
     from composer.yaml_text.positions import DataPath
@@ -68,12 +70,19 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
                 unused[section] = {k: v for k, v in entries.items() if k not in used[section]}
         _leave_out_entities(system, used, unused)
         samples = StartValues()
-        filled = fill_start_values(unused, system.positions, samples, system.sampled_unused)
+        filled = _fill(system, unused, samples, system.sampled_unused)
         system.unused = parse_system(filled, name)
     system.data = used
     _drop_inherited_hosts(system)
-    system.filled = fill_start_values(used, system.positions, system.start, system.sampled)
+    system.filled = _fill(system, used, system.start, system.sampled)
     system.spec = parse_system(system.filled, name, before)
+
+
+def _fill(
+    system: LoadedSystem, data: Data, start: StartValues, sampled: list[Span]
+) -> dict[str, Any]:
+    find_host = create_host_finder(data)
+    return fill_start_values(data, system.positions, start, sampled, find_host)
 
 
 def _drop_inherited_hosts(system: LoadedSystem) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from composer.language.specs import (
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from composer.yaml_text.positions import DataPath
 
@@ -52,6 +53,24 @@ def with_hosts(
         if node.host != host:
             placed[key] = replace(node, host=host)
     return MappingProxyType(placed)
+
+
+def create_host_finder(data: Data) -> Callable[[DataPath], str]:
+    """Return a function that returns the host of the node or process that a path leads into."""
+
+    @cache
+    def workers() -> Mapping[str, WorkerSpec]:
+        return parse_workers(data)
+
+    def find(path: DataPath) -> str:
+        if path[0] not in ('nodes', 'processes'):
+            return ''
+        entry = data[str(path[0])][path[1]]
+        host: str = entry.get('host', '')
+        is_in_worker = path[0] == 'nodes' and not host and entry.get('worker')
+        return workers()[entry['worker']].host if is_in_worker else host
+
+    return find
 
 
 def parse_hosts(data: Data) -> Mapping[str, HostSpec]:

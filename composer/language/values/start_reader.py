@@ -38,9 +38,15 @@ class StartValueError(ComposerError):
 
 
 class StartValueReader:
-    """Reads values, each once as long as nothing that it depends on has changed."""
+    """Reads values, each once as long as nothing that it depends on has changed.
 
-    def __init__(self) -> None:
+    Args:
+        host: The host whose part needs them: samples stand for the values of others. Empty for the
+            whole system.
+    """
+
+    def __init__(self, host: str = '') -> None:
+        self._host = host
         self._printed: dict[tuple[Any, ...], str] = {}
 
     def read(self, value: StartValue) -> Any:
@@ -50,6 +56,8 @@ class StartValueReader:
             StartValueError: Its command fails or prints nothing, its file cannot be read or has
                 no such key, or it is of another type.
         """
+        if value.is_elsewhere(self._host):
+            return value.sample
         try:
             return _converted(value, self._find(value))
         except ComposerError as error:

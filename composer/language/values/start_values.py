@@ -7,7 +7,7 @@ what a process is given. Until then a sample of their type stands for them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -45,6 +45,7 @@ class StartValue:
         is_exact: Whether line breaks at the end of a text belong to it.
         span: Where it is written.
         spans: Where the words of the command, or the file, are written.
+        host: The host whose part needs it; empty for all.
     """
 
     name: str
@@ -56,6 +57,11 @@ class StartValue:
     is_exact: bool
     span: Span
     spans: tuple[Span, ...]
+    host: str = ''
+
+    def is_elsewhere(self, host: str) -> bool:
+        """Return whether the part of a host does without it; `''` is the whole system."""
+        return bool(host and self.host and self.host != host)
 
     @property
     def sample(self) -> Any:
@@ -200,12 +206,17 @@ def _replaced(
 
 
 def fill_start_values(
-    data: dict[str, Any], positions: SourceMap, start: StartValues, sampled: list[Span]
+    data: dict[str, Any],
+    positions: SourceMap,
+    start: StartValues,
+    sampled: list[Span],
+    find_host: Callable[[DataPath], str],
 ) -> dict[str, Any]:
     """Return a system's data with the values that are read at the start, or samples of them.
 
     Args:
         sampled: Where samples are written is added to it.
+        find_host: Returns the host of what a path leads to; empty for none.
 
     Raises:
         ComposerError: A value cannot be read.
@@ -213,6 +224,7 @@ def fill_start_values(
 
     def value_of(path: DataPath, written: dict[str, Any]) -> Any:
         source = parse_start_value(_describe(path), written, path, positions)
+        source = replace(source, host=find_host(path))
         value, is_sample = start.value_of(source)
         if is_sample:
             sampled.append(source.span)
