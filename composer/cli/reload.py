@@ -176,10 +176,15 @@ class Reloader:
             snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
-        with fresh_modules(stale, snapshot.sources, search_path) as import_rest:
+        workers = system.workers
+        with (
+            fresh_modules(stale, snapshot.sources, search_path) as import_rest,
+            workers.importing(),
+        ):
+            workers.spawn(snapshot.spec)
 
             def import_all() -> Reading | None:
-                reading = import_reading(context, snapshot, findings.extend)
+                reading = import_reading(context, snapshot, findings.extend, workers, stale)
                 if reading is not None:
                     import_rest()
                 return reading

@@ -144,7 +144,7 @@ def _run(  # noqa: PLR0913 - as above
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.environment import environment_set
-    from composer.runtime.run import run_system
+    from composer.runtime.workers.workers import Workers
 
     prefixes = import_declared(context.interfaces, lambda line: click.echo(line, err=True))
     with (
@@ -152,7 +152,16 @@ def _run(  # noqa: PLR0913 - as above
         project_on_path(project_search_path(context.system.files)),
     ):
         report = _show_errors if rehearses else show_findings
-        reading = import_reading(context, take_snapshot(context, prefixes), report)
+        snapshot = take_snapshot(context, prefixes)
+        workers = Workers(ros_arguments, log_levels)
+        workers.spawn(snapshot.spec)
+        # It imports ROS, as the workers do meanwhile.
+        from composer.runtime.run import run_system
+
+        with workers.importing():
+            reading = import_reading(context, snapshot, report, workers)
+        if reading is None:
+            workers.stop()
         if rehearses:
             # What modules of behaviours do at the exit is not for here.
             flush_output()
@@ -168,6 +177,7 @@ def _run(  # noqa: PLR0913 - as above
                 ros_arguments=ros_arguments,
                 log_level_requests=log_levels,
                 recorder=recorder,
+                workers=workers,
                 ends_process=ends_process,
             )
 

@@ -24,7 +24,9 @@ class ProcessRun:
         code: The exit code, or a signal's number, negative; `None` while it runs.
         answer: The reaper's answer to the request to start it.
         has_failed: Whether it was ended because it did not do what it was to do.
+        ended: Set when `code` is known.
         gone: Set when nothing of its process group is left.
+        pid: Its process ID.
     """
 
     number: int
@@ -32,7 +34,9 @@ class ProcessRun:
     output_ended: threading.Event
     code: int | None = None
     answer: queue.SimpleQueue[dict[str, Any]] = field(default_factory=queue.SimpleQueue)
+    ended: threading.Event = field(default_factory=threading.Event)
     gone: threading.Event = field(default_factory=threading.Event)
+    pid: int = 0
     was_killed: bool = False
     has_failed: bool = False
 

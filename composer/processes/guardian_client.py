@@ -106,6 +106,26 @@ class GuardianClient:
             self.mark = 0
 
 
+class NoGuardian:
+    """Stands for a guardian where something else ends a process that hangs.
+
+    Args:
+        owns_process: See `GuardianClient`.
+    """
+
+    mark = 0
+
+    def __init__(self, *, owns_process: bool) -> None:
+        self.owns_process = owns_process
+
+    def allow(self, _stop_sec: float) -> None:
+        """Do nothing."""
+
+    def begin_stop(self) -> bool:
+        """Tell that the stop goes on."""
+        return True
+
+
 def _find_marked(mark: int) -> dict[int, str]:
     # Where a behaviour has used up all descriptors, the guardian ends them afterwards.
     with suppress(OSError):

@@ -18,12 +18,14 @@ Requests and answers are one JSON object a line. Requests: `start` (a number tha
 `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number, `signal`,
 `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
 (`code`, negative for a signal), and `gone`, once nothing of its process group is left; `killed`
-comes before it if the timeout of a stop has passed.
+comes before it if the timeout of a stop has passed. A second descriptor is for what a process
+writes to standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
 
 import contextlib
 import ctypes
+import fcntl
 import json
 import os
 import resource
@@ -45,6 +47,10 @@ _POLL_SEC = 0.02
 _CHUNK = 1 << 16
 _NEVER = float('inf')
 _EXEC_FAILED = 127
+# How many descriptors a request may come with.
+_MOST_DESCRIPTORS = 16
+# The descriptor of a process for the connection to Composer.
+LINK = 3
 # Programs start with the default actions, whatever Composer and Python ignore or handle.
 _DEFAULT_SIGNALS = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}
 
@@ -114,7 +120,7 @@ class Reaper:
     def _receive(self) -> bool:
         """Serve the requests that have come; return whether Composer is still connected."""
         try:
-            data, descriptors, _, _ = socket.recv_fds(self._connection, _CHUNK, 16)
+            data, descriptors, _, _ = socket.recv_fds(self._connection, _CHUNK, _MOST_DESCRIPTORS)
         except ConnectionError:
             return False
         for descriptor in descriptors:
@@ -124,7 +130,9 @@ class Reaper:
         for line in lines:
             request = json.loads(line)
             if request['do'] == 'start':
-                self._start(request, self._descriptors.pop(0))
+                count = request['descriptors']
+                self._start(request, self._descriptors[:count])
+                del self._descriptors[:count]
             else:
                 self._stop(request)
         return bool(data)
@@ -135,14 +143,14 @@ class Reaper:
         with contextlib.suppress(OSError):
             self._connection.sendall(line)
 
-    def _start(self, request: dict[str, Any], output: int) -> None:
+    def _start(self, request: dict[str, Any], descriptors: list[int]) -> None:
         report, report_end = os.pipe2(os.O_CLOEXEC)
         reaper = os.getpid()
         pid = os.fork()
         if pid == 0:
-            _execute(request, output, report_end, reaper)
-        os.close(output)
-        os.close(report_end)
+            _execute(request, descriptors, report_end, reaper)
+        for each in (*descriptors, report_end):
+            os.close(each)
         with os.fdopen(report, 'rb') as reader:
             failure = reader.read()
         if failure:
@@ -192,7 +200,7 @@ class Reaper:
                 group.signal(signal.SIGKILL)
 
 
-def _execute(request: dict[str, Any], output: int, report: int, reaper: int) -> None:
+def _execute(request: dict[str, Any], descriptors: list[int], report: int, reaper: int) -> None:
     """Replace a forked child by the requested program; does not return."""
     doing = 'prepare'
     try:
@@ -205,8 +213,13 @@ def _execute(request: dict[str, Any], output: int, report: int, reaper: int) -> 
             with contextlib.suppress(OSError, ValueError):
                 signal.signal(each, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        output, *others = descriptors
         os.dup2(output, 1)
-        os.dup2(output, 2)
+        os.dup2(others[0] if others else output, 2)
+        for link in others[1:]:
+            # The number may be that of the report, which is needed until the end.
+            report = fcntl.fcntl(report, fcntl.F_DUPFD_CLOEXEC, LINK + 1)
+            os.dup2(link, LINK)
         doing = 'folder'
         if request['cwd'] is not None:
             os.chdir(request['cwd'])

@@ -68,16 +68,17 @@ class ReaperConnection:
         command: Sequence[str],
         env: Mapping[str, str],
         cwd: str | None,
-        output: int,
+        descriptors: Sequence[int],
     ) -> None:
         """Ask for a process to be started.
 
         Args:
             number: Identifies the process in the answers.
-            output: A descriptor for its output; it remains the caller's.
+            descriptors: For its output; for standard error, if that is another one; and for its
+                connection to Composer, if it has one. They remain the caller's.
         """
         request = {'do': 'start', 'command': command, 'env': {**env, self.mark: '1'}, 'cwd': cwd}
-        self._send(request | {'number': number}, [output])
+        self._send(request | {'number': number, 'descriptors': len(descriptors)}, descriptors)
 
     def stop(
         self, number: int, signal_number: int, timeout_sec: float, *, alone: bool = False

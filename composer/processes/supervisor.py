@@ -20,9 +20,10 @@ from composer.processes.process_commands import CommandWriter, find_folder
 from composer.processes.process_output import ProcessOutputs
 from composer.processes.reaper_client import ReaperConnection
 from composer.programs import base_environment
+from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from composer.language.specs import ProcessSpec
     from composer.terminal import EscapingLogger
@@ -79,7 +80,8 @@ class ProcessSupervisor:
         self._watchers: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._stopping = threading.Event()
-        self._tools: _Tools | None = None
+        self._tools: Tools | None = None
+        self._noun = 'process'
 
     def start(self, process: ExternalProcess) -> None:
         """Start a process; after `stop`, or when it was removed, nothing happens.
@@ -93,14 +95,14 @@ class ProcessSupervisor:
         try:
             run = self._launch(process)
         except OSError as error:
-            message = f"process '{process.spec.name}' cannot be started: {error}"
+            message = f"{self._noun} '{process.spec.name}' cannot be started: {error}"
             raise StartError(message) from error
         if run is None:
             return
         answer = run.answer.get()
         if answer['kind'] == 'failed':
             self._runs.pop(run.number, None)
-            raise _start_error(process.spec, answer)
+            raise _start_error(self._noun, process.spec, answer)
 
     def remove(self, name: str) -> None:
         """End a process, and all that it has started, and forget it."""
@@ -118,6 +120,12 @@ class ProcessSupervisor:
         if tools is not None and run.code is None and (spec.restart != 'never' or spec.on_exit):
             run.has_failed = True
             self._ask_to_end(run, tools)
+
+    def kill(self, process: ExternalProcess) -> None:
+        """Kill a process, which has failed."""
+        run, tools = process.run, self._tools
+        if run is not None and tools is not None and run.code is None:
+            tools.reaper.stop(run.number, signal.SIGKILL, 0.0)
 
     def tell_ends(self) -> None:
         """Log from now on how processes have ended: the system has started, or never will."""
@@ -155,25 +163,33 @@ class ProcessSupervisor:
 
     def _launch(self, process: ExternalProcess) -> ProcessRun | None:
         """Ask the reaper to start a process; return its run, `None` after the stop."""
-        spec = process.spec
-        environment = {**base_environment(os.environ), **spec.env}
         with self._lock:
             if self._stopping.is_set():
                 return None
             if self._tools is None:
-                self._tools = _Tools(
+                self._tools = Tools(
                     self._take_answer, self._on_reaper_lost, self._ros_arguments, self._log_levels
                 )
-            tools = self._tools
-            command, folder = tools.commands.write(spec, environment), find_folder(spec)
-            output, output_end = os.pipe()
-            run = ProcessRun(next(self._numbers), process, tools.outputs.add(spec.name, output))
-            self._runs[run.number] = run
-            tools.reaper.start(run.number, command, environment, folder, output_end)
-            os.close(output_end)
+            number = next(self._numbers)
+            launch = self._prepare(process, self._tools)
+            run = self._runs[number] = ProcessRun(number, process, launch.output_ended)
+            self._tools.reaper.start(
+                number, launch.command, launch.environment, launch.folder, launch.descriptors
+            )
+            for each in launch.descriptors:
+                os.close(each)
             return run
 
-    def _ask_to_end(self, run: ProcessRun, tools: _Tools) -> None:
+    def _prepare(self, process: ExternalProcess, tools: Tools) -> Launch:
+        """Return what a process is started with."""
+        spec = process.spec
+        environment = {**base_environment(os.environ), **spec.env}
+        command, folder = tools.commands.write(spec, environment), find_folder(spec)
+        output, output_end = os.pipe()
+        ended = tools.outputs.add(spec.name, output)
+        return Launch(command, environment, folder, ended, [output_end])
+
+    def _ask_to_end(self, run: ProcessRun, tools: Tools) -> None:
         spec = run.process.spec
         number = signal.Signals[spec.stop_signal]
         # `ros2 launch` ends what it has started, each in its own time.
@@ -190,6 +206,7 @@ class ProcessSupervisor:
         kind = answer['kind']
         if kind == 'started':
             run.process.run = run
+            run.pid = answer['pid']
             run.answer.put(answer)
             self.on_run(run)
         elif kind == 'failed':
@@ -197,6 +214,7 @@ class ProcessSupervisor:
         elif kind == 'ended':
             # However it has ended then.
             run.code = answer['code'] or (ExitCode.FAILED if run.has_failed else 0)
+            run.ended.set()
             watcher = threading.Thread(target=self._after_end, args=(run, run.code), daemon=True)
             self._watchers = [each for each in self._watchers if each.is_alive()]
             self._watchers.append(watcher)
@@ -212,7 +230,7 @@ class ProcessSupervisor:
         if spec.stop_signal != 'SIGKILL':
             run.was_killed = True
             self._logger.error(
-                f"process '{spec.name}' did not end within {self._timeout_of(spec):g} s of "
+                f"{self._noun} '{spec.name}' did not end within {self._timeout_of(spec):g} s of "
                 f'{spec.stop_signal}, and is killed'
             )
 
@@ -230,7 +248,7 @@ class ProcessSupervisor:
         # Children of the process may hold its output open for longer.
         run.output_ended.wait(_LAST_OUTPUT_SEC)
         process, name = run.process, run.process.spec.name
-        end = f"process '{name}' {describe_end(code)}"
+        end = f"{self._noun} '{name}' {describe_end(code)}"
         if self._stopping.is_set() or process.is_leaving:
             expected = (0, -signal.Signals[process.spec.stop_signal])
             self._log(end, is_error=code not in expected and not run.was_killed)
@@ -277,7 +295,8 @@ class ProcessSupervisor:
     def end_system(self, process: ExternalProcess, code: int) -> None:
         """End the system, because a process has ended."""
         self._has_started.wait(_LONGEST_START_SEC)
-        self._log(f"process '{process.spec.name}' has ended: the system ends", is_error=code != 0)
+        text = f"{self._noun} '{process.spec.name}' has ended: the system ends"
+        self._log(text, is_error=code != 0)
         self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
 
     def _end_if_last(self) -> None:
@@ -296,7 +315,24 @@ class ProcessSupervisor:
             self._logger.info(text)
 
 
-class _Tools:
+@record
+class Launch:
+    """What a process is started with.
+
+    Attributes:
+        folder: The folder it runs in; `None` for that of Composer.
+        output_ended: Set when no process holds its output open any more.
+        descriptors: See `ReaperConnection.start`; closed once it has them.
+    """
+
+    command: Sequence[str]
+    environment: Mapping[str, str]
+    folder: str | None
+    output_ended: threading.Event
+    descriptors: Sequence[int]
+
+
+class Tools:
     """What external processes need; created for the first of them."""
 
     def __init__(
@@ -318,7 +354,7 @@ class _Tools:
         self._folder.cleanup()
 
 
-def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
+def _start_error(noun: str, spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
     program = spec.command[0] if spec.command else spec.executable or 'ros2'
     if answer['doing'] == 'reaper':
         reason = 'the process reaper was killed'
@@ -326,4 +362,4 @@ def _start_error(spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
         reason = f"its folder '{spec.cwd}': {os.strerror(answer['errno'])}"
     else:
         reason = f"'{program}': {os.strerror(answer['errno'])}"
-    return StartError(f"process '{spec.name}' cannot be started: {reason}")
+    return StartError(f"{noun} '{spec.name}' cannot be started: {reason}")

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from composer.runtime.control.control_services import Commands
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import SystemRecorder
+    from composer.runtime.workers.workers import Workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Sent when the terminal is closed, often twice: by the shell and by the kernel. systemd sends it
@@ -38,7 +39,7 @@ _HANG_UP = signal.SIGHUP
 _EXIT_SEC = 10.0
 
 
-def run_system(
+def run_system(  # noqa: PLR0913 - one for each part
     reading: Reading,
     *,
     watch: Callable[[System], AbstractContextManager[object]] | None = None,
@@ -46,6 +47,7 @@ def run_system(
     ros_arguments: Sequence[str] = (),
     log_level_requests: Sequence[str] = (),
     recorder: SystemRecorder | None = None,
+    workers: Workers | None = None,
     ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
@@ -63,6 +65,8 @@ def run_system(
         commands: What the system does with its files when it is asked; `None` if it is not to be
             asked.
         recorder: Records the topics of the system; `None` if nothing does.
+        workers: Run the nodes that are in workers, and have imported their behaviours; `None` if
+            all run in this process.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it. Only then can the
             system start again.
@@ -89,6 +93,7 @@ def run_system(
             stop_request=stop,
             commands=commands,
             recorder=recorder,
+            workers=workers,
         )
         guardian.wait_until_begun()
         # A program that runs a system in itself tells its own parent.

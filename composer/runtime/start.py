@@ -19,7 +19,7 @@ from composer.runtime.lifecycle.transitions import Lifecycle
 from composer.runtime.logs import set_level
 from composer.runtime.nodes.callback_groups import LifecycleGate
 from composer.runtime.nodes.live_node import LiveNode, create_live_node
-from composer.runtime.wait_for import WaitingStarter, list_waiters
+from composer.runtime.wait_for import Waiter, WaitingStarter, list_waiters
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -66,37 +66,46 @@ class Starter:
         create_entities(nodes)
         return nodes
 
-    def start(
-        self,
-        nodes: Collection[LiveNode],
-        processes: Collection[ExternalProcess],
-        components: Iterable[tuple[ExternalProcess, ComponentSpec]] = (),
+    def start_prompt(
+        self, nodes: Iterable[LiveNode], processes: Iterable[ExternalProcess]
     ) -> list[LiveNode]:
-        """Start processes and nodes; return the nodes that are still to be opened.
-
-        Args:
-            components: Those to load into containers that run.
+        """Start what waits for nothing; return these nodes, which are still to be opened.
 
         Raises:
             StartError: One could not start.
         """
-        stop = self._system.stop
         for process in processes:
             spec = process.spec
-            if not (spec.on_demand or spec.starts_late or stop.is_set):
+            if not (spec.on_demand or spec.starts_late or self._system.stop.is_set):
                 self._processes.start(process)
         prompt = [node for node in nodes if not node.spec.starts_late]
         for node in prompt:
             self.run_on_start(node)
+        return prompt
+
+    def list_waiters(
+        self,
+        nodes: Iterable[LiveNode],
+        processes: Collection[ExternalProcess],
+        components: Iterable[tuple[ExternalProcess, ComponentSpec]] = (),
+    ) -> list[Waiter]:
+        """Return what waits for something before it starts.
+
+        Args:
+            components: Those to load into containers that run.
+        """
         own = [each for each in processes if not each.spec.on_demand]
         waiters = list_waiters(nodes, own, self._start_late, self._processes.start)
         waiters += self.components.waiters(processes)
-        waiters += [self.components.waiter(*each) for each in components]
-        if not waiters or stop.is_set:
-            return prompt
-        self.open(prompt)
-        self._waiting_starter().start_all(waiters, stop, self._system.is_outdated)
-        return []
+        return waiters + [self.components.waiter(*each) for each in components]
+
+    def start_waiting(self, waiters: Iterable[Waiter]) -> None:
+        """Start what waits, each as soon as what it waits for is there.
+
+        Raises:
+            StartError: Something was not there in time.
+        """
+        self._waiting_starter().start_all(waiters, self._system.stop, self._system.is_outdated)
 
     def start_on_demand(self, process: ExternalProcess) -> None:
         """Start a process now that another one has ended, once its conditions hold.
@@ -120,7 +129,7 @@ class Starter:
         """Start nodes and processes beside those that run.
 
         Args:
-            components: See `start`.
+            components: See `list_waiters`.
 
         Raises:
             StartError: One could not start.
@@ -128,7 +137,8 @@ class Starter:
         for node in nodes:
             self._system.executor.add_node(node.ros)
             node.serve_at_once()
-        self.open(self.start(nodes, processes, components))
+        self.open(self.start_prompt(nodes, processes))
+        self.start_waiting(self.list_waiters(nodes, processes, components))
         for node in nodes:
             node.ros.start_parameter_services()
 
@@ -195,7 +205,7 @@ class Starter:
             self._system.context,
             self._system.executor,
             self._nodes,
-            self._processes.by_name,
+            self._system.elsewhere,
             self._system.positions,
         )
 

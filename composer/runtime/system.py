@@ -31,12 +31,15 @@ from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import ServiceFailures, SystemHandle
 from composer.runtime.reserved_methods import release, reserve
 from composer.runtime.restart import ErrorPolicy, NodeRestarter
+from composer.runtime.rewiring.edit import Edit
 from composer.runtime.rewiring.goals_in_flight import wait_for_goals
 from composer.runtime.rewiring.rewire import Rewiring
 from composer.runtime.start import Starter
 from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
+from composer.runtime.wait_for import find_hidden
+from composer.runtime.workers.workers import find_moved, no_workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -48,11 +51,12 @@ if TYPE_CHECKING:
     from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
     from composer.processes.external_process import ExternalProcess
-    from composer.processes.guardian_client import GuardianClient
+    from composer.processes.guardian_client import GuardianClient, NoGuardian
     from composer.runtime.control.control_services import Commands
     from composer.runtime.health.deliveries import Deliveries
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.workers.workers import Workers
 
 _EXECUTOR_STOP_SEC = 1.0
 
@@ -79,6 +83,7 @@ class System:
         stop_request: The request to stop it; by default a new one.
         commands: What it does with its files when it is asked; `None` if it is not to be asked.
         recorder: Records its topics; `None` if nothing does.
+        workers: Run the nodes that are in workers; `None` if all run in this process.
 
     Attributes:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
@@ -86,21 +91,25 @@ class System:
         state: What it says of itself.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - one for each part
         self,
         reading: Reading,
-        guardian: GuardianClient,
+        guardian: GuardianClient | NoGuardian,
         ros_arguments: Sequence[str] = (),
         log_levels: Sequence[str] = (),
         *,
         stop_request: StopRequest | None = None,
         commands: Commands | None = None,
         recorder: SystemRecorder | None = None,
+        workers: Workers | None = None,
     ) -> None:
         self._recorder = recorder
-        self._reading = reading
-        spec = reading.spec
-        self.state = SystemState(spec.name, reading.positions.source.name)
+        self.workers = workers or no_workers()
+        # What is told of the system, and what this process runs of it.
+        self._whole, self._reading = reading, self.workers.own_part(reading)
+        spec = self._reading.spec
+        self._prompt: list[LiveNode] = []
+        self.state = SystemState(system_title(spec), reading.positions.source.name)
         self._guardian = guardian
         self.has_ended = False
         self._stop_request = stop_request or StopRequest()
@@ -118,7 +127,7 @@ class System:
         self._graph_watcher = GraphWatcher(
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints]
         )
-        self._error_policy = ErrorPolicy(self.restart_node, self._stop_request.make)
+        self._error_policy = ErrorPolicy(self.restart_node, self.shutdown)
         self._handle = self._create_handle(ros_arguments, log_levels)
         self._processes = ProcessSupervisor(
             spec.processes.values(),
@@ -128,8 +137,8 @@ class System:
             ros_arguments,
             log_levels,
         )
-        self._processes.is_alone = not spec.nodes
-        self._stop_request.kill_processes = self._processes.kill_all
+        self._processes.is_alone = not reading.spec.nodes
+        self._stop_request.kill_processes = self._kill_processes
         self._components = Components(self._handle)
         self._processes.on_restart = self._components.reload
         self.state.find_lifecycles = self._find_lifecycles
@@ -143,7 +152,30 @@ class System:
         self._components.on_load = self._driver.begin_component
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
-        self._control = ControlNode(self, spec, self._handle.health, self._hang_watcher, commands)
+        self._control = self._create_control(commands)
+        self.workers.bind(self, reading)
+
+    def _create_control(self, commands: Commands | None) -> ControlNode:
+        return ControlNode(
+            self,
+            self._reading.spec,
+            self._handle.health,
+            self._hang_watcher,
+            commands,
+        )
+
+    @property
+    def _most_threads(self) -> int | None:
+        """How many callbacks may run at a time; `None` for as many as block."""
+        return self._reading.spec.threads
+
+    def _kill_processes(self) -> None:
+        self.workers.kill_all()
+        self._processes.kill_all()
+
+    def shutdown(self, code: int) -> None:
+        """End the whole system, because one of its nodes asks for that."""
+        self._stop_request.make(code)
 
     def _create_executor(self, **calls: Any) -> SystemExecutor:
         """Return what runs the callbacks.
@@ -151,7 +183,7 @@ class System:
         Args:
             calls: Arguments of `SystemExecutor`: what it calls.
         """
-        return SystemExecutor(self._context, self._reading.spec.threads, **calls)
+        return SystemExecutor(self._context, self._most_threads, **calls)
 
     def _create_handle(
         self, ros_arguments: Sequence[str], log_levels: Sequence[str]
@@ -166,7 +198,7 @@ class System:
             ros_arguments=ros_arguments,
             log_levels=log_levels,
             act_on_error=self._error_policy.act,
-            shutdown=self._stop_request.make,
+            shutdown=self.shutdown,
             executor=self._executor,
             stop=self._stop_request,
             failures=ServiceFailures(),
@@ -175,6 +207,7 @@ class System:
             health=HealthRegistry(),
             topics=LocalTopics(self._executor),
             services=LocalServices(self._executor),
+            elsewhere=self,
             create_entity=create_entity,
         )
 
@@ -194,47 +227,95 @@ class System:
     def start(self) -> None:
         """Create all nodes and entities, run `on_start`, then let the behaviours run.
 
-        External processes start before any `on_start`. What has a `wait_for` or a `delay`
-        starts last, while
+        No `on_start` runs before all nodes are created, those in workers, too. External processes
+        start before any `on_start`. What has a `wait_for` or a `delay` starts last, while
         the behaviours of all others run. If a node cannot start, the `on_stop` of those that
         have started is run.
 
         Raises:
             StartError: Something could not start; all the rest has been stopped again.
         """
+        together = self.workers.together
         try:
-            self._control.start(self._context, self._handle.ros_arguments)
-            if self._recorder is not None:
-                self._recorder.start(self._context, self._handle.topics)
-            self._create_nodes()
-            self._executor.start()
-            self._hang_watcher.start()
-            self._graph_watcher.start()
-            self._parameter_services.start()
-            for node in self._nodes.values():
-                node.serve_at_once()
-            self._executor.wake()
-            prompt = self._starter.start(self._nodes.values(), self._processes.by_name.values())
+            with together('create'):
+                self.create()
+            with together('run_on_start') as wait_elsewhere:
+                waits = self.run_on_start()
+            if (waits or any(wait_elsewhere)) and not self.stop_requested:
+                with together('open'):
+                    self.open()
+                with together('start_waiting'):
+                    self.start_waiting()
         except BaseException:
             self.stop()
             raise
         if self.stop_requested:
             return
-        parts = _describe_parts(
-            self._nodes,
-            self.list_components(),
-            [each for each in self._processes.by_name.values() if not each.spec.external],
-        )
         # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
-        system_logger.info(
-            f'{self._reading.spec.name}: {parts} ready in {self.state.uptime_sec:.2f} s'
-        )
+        self._tell_start()
+        with together('be_up'):
+            self.be_up()
+
+    def create(self) -> None:
+        """Create all nodes and entities of this process; no behaviour is called yet.
+
+        Raises:
+            StartError: One of them cannot be created.
+        """
+        self._control.start(self._context, self._handle.ros_arguments)
+        if self._recorder is not None:
+            self._recorder.start(self._context, self._handle.topics)
+        self._create_nodes()
+        self._executor.start()
+        self._hang_watcher.start()
+        self._graph_watcher.start()
+        self._parameter_services.start()
+        for node in self._nodes.values():
+            node.serve_at_once()
+        self._executor.wake()
+
+    def run_on_start(self) -> bool:
+        """Start processes and nodes that wait for nothing; return whether others wait.
+
+        Raises:
+            StartError: One of them could not start.
+        """
+        processes = self._processes.by_name.values()
+        self._prompt = self._starter.start_prompt(self._nodes.values(), processes)
+        return bool(self._starter.list_waiters(self._nodes.values(), processes))
+
+    def open(self) -> None:
+        """Let the behaviours be called of the nodes that have started."""
+        prompt, self._prompt = self._prompt, []
         self._starter.open(prompt)
+
+    def start_waiting(self) -> None:
+        """Start what waits for something.
+
+        Raises:
+            StartError: It was not there in time.
+        """
+        processes = self._processes.by_name.values()
+        waiters = self._starter.list_waiters(self._nodes.values(), processes)
+        self._starter.start_waiting(waiters)
+
+    def be_up(self) -> None:
+        """Run from now on: all of the system has started."""
+        self.open()
         self._processes.tell_ends()
         self.state.is_up = True
         self._control.begin()
         self._parameter_services.begin()
+
+    def _tell_start(self) -> None:
+        parts = _describe_parts(
+            self._whole.spec.nodes,
+            self.list_components(),
+            [each for each in self._processes.by_name.values() if not each.spec.external],
+            self.workers.names,
+        )
+        system_logger.info(f'{self.state.name}: {parts} ready in {self.state.uptime_sec:.2f} s')
 
     def _create_nodes(self) -> None:
         """Create all nodes; none of their behaviours is called yet."""
@@ -254,7 +335,7 @@ class System:
             for node in list(self._nodes.values())
             if node.parameters and node.parameters.set_live
         }
-        return replace(self._reading.snapshot, set_live=set_live)
+        return replace(self._whole.snapshot, set_live=set_live)
 
     def rewire(
         self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
@@ -269,6 +350,27 @@ class System:
             ComposerError: That failed, and the system is as it was.
         """
         plan = compare(self.snapshot, new.snapshot)
+        moved = find_moved(self._whole.spec, new.spec) if self.workers.are_used else ()
+        edits = [self.begin_edit(self.workers.own_part(new)), *self.workers.begin_edits(new)]
+        with self.workers.editing(new, aborts_goals, is_outdated):
+            try:
+                for each in edits:
+                    each.wait_for_goals(aborts_goals, is_outdated)
+                for each in edits:
+                    each.make_way(moved)
+                for each in edits:
+                    each.apply(is_outdated)
+            except BaseException:
+                for each in reversed(edits):
+                    each.undo()
+                raise
+            for each in edits:
+                each.commit()
+            self._whole = new
+        return plan
+
+    def begin_edit(self, new: Reading) -> Edit:
+        """Return an edit by which this process becomes what `new` says."""
         rewiring = Rewiring(
             self._nodes,
             self._processes,
@@ -278,21 +380,20 @@ class System:
             self._reading,
             new,
         )
-        rewiring.wait_for_goals(plan, aborts_goals, is_outdated)
-        with self._restarter.lock:
-            if self.stop_requested:
-                return plan
-            rewiring.apply(plan, is_outdated)
+
+        def follow() -> None:
             self._reading = new
             self._follow(new.spec)
-        return plan
+
+        plan = compare(self._reading.snapshot, new.snapshot)
+        return Edit(plan, rewiring, self._restarter.lock, self._stop_request, follow)
 
     def _follow(self, spec: SystemSpec) -> None:
         """Do what the system as a whole does as `spec` says from now on."""
-        self._executor.limit_threads(spec.threads)
+        self._executor.limit_threads(self._most_threads)
         self._handle.stop_timeout_sec = self._processes.timeout_sec = spec.shutdown_timeout_sec
         self._guardian.allow(limit_stop(spec, ends_process=self._guardian.owns_process))
-        self._processes.is_alone = not spec.nodes
+        self._processes.is_alone = not (spec.nodes or self.workers.names)
         self._hang_watcher.follow(spec)
         self._control.follow(spec)
 
@@ -327,7 +428,7 @@ class System:
 
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""
-        return list(self._nodes)
+        return [*self._nodes, *self.workers.list_nodes()]
 
     def list_components(self) -> list[str]:
         """Return the full names of the components that are loaded into its containers."""
@@ -336,6 +437,18 @@ class System:
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
+
+    def find_process(self, name: str) -> ExternalProcess:
+        """Return an external process; see `Elsewhere`."""
+        return self._processes.by_name[name]
+
+    def find_hidden(self) -> frozenset[str]:
+        """Return the full names of the nodes in workers that have not started."""
+        return self.workers.find_hidden()
+
+    def list_hidden(self) -> frozenset[str]:
+        """Return the full names of the nodes of this process that have not started."""
+        return find_hidden(self._nodes)
 
     def _find_lifecycles(self) -> dict[str, str]:
         nodes = list(self._nodes.values())
@@ -346,6 +459,8 @@ class System:
 
         A component is unloaded and loaded.
         """
+        if (worker := self.workers.find(full_name)) is not None:
+            return worker.restart_node(full_name)
         if full_name in self._nodes:
             failure = self._restarter.restart(full_name)
         else:
@@ -378,8 +493,12 @@ class System:
         timeout_sec = self._reading.spec.shutdown_timeout_sec
         self._error_policy.stop()
         self._parameter_services.stop()
+        self.workers.begin_stop()
         with self._restarter.lock:
             ended = stop_nodes(list(self._nodes.values()), timeout_sec)
+        code, ended_elsewhere = self.workers.stop()
+        if code:
+            self._stop_request.set_code(code)
         ended &= all(node.running.wait_until_idle(0.0) for node in self._restarter.left)
         self._components.stop()
         # Processes end after the nodes: an `on_stop` may need them.
@@ -387,7 +506,7 @@ class System:
         ended &= self._exits.report_hanging()
         if self._guardian.mark:
             none_killed &= end_marked(self._guardian.mark, timeout_sec, system_logger)
-        if not (none_killed and ended):
+        if not (none_killed and ended and ended_elsewhere):
             self._stop_request.set_code(ExitCode.FAILED)
         if self._recorder is not None:
             self._recorder.stop(goes_on=self._stop_request.starts_again)
@@ -437,14 +556,23 @@ class System:
             self._control.release_name()
 
 
+def system_title(spec: SystemSpec) -> str:
+    """Return the name of a system; that of the part of one host has the host's name behind it."""
+    return f'{spec.name}@{spec.host}' if spec.host else spec.name
+
+
 def _describe_parts(
-    nodes: Collection[str], components: Collection[str], processes: Collection[ExternalProcess]
+    nodes: Collection[str],
+    components: Collection[str],
+    processes: Collection[ExternalProcess],
+    workers: Collection[str],
 ) -> str:
     """Return `2 nodes, 3 components and 1 process`; what there is none of is left out."""
     counts = (
         (len(nodes), 'node', 'nodes'),
         (len(components), 'component', 'components'),
         (len(processes), 'process', 'processes'),
+        (len(workers), 'worker', 'workers'),
     )
     parts = [f'{count} {one if count == 1 else many}' for count, one, many in counts if count]
     *first, last = parts or ['0 nodes']

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from composer.executor import ComposerExecutor
     from composer.language.specs import ConditionSpec, ProcessSpec
     from composer.processes.external_process import ExternalProcess
+    from composer.runtime.elsewhere import Elsewhere
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.stop_request import StopRequest
     from composer.yaml_text.positions import DataPath, SourceMap
@@ -73,13 +74,19 @@ class Waiter:
     is_wanted: Callable[[], bool]
 
 
+def find_hidden(nodes: Mapping[str, LiveNode]) -> frozenset[str]:
+    """Return the full names of those nodes that have not started."""
+    closed = [node for node in list(nodes.values()) if not node.gate.is_open]
+    return frozenset(node.full_name for node in closed)
+
+
 class WaitingStarter:
     """Starts each waiting node and process as soon as its conditions hold.
 
     Args:
         executor: Spins the node that asks other nodes for their states.
         nodes: The nodes of the system; what is in those that have not started does not count.
-        processes: The processes of the system, by their names.
+        elsewhere: What of the system is not in these nodes.
     """
 
     def __init__(
@@ -87,14 +94,14 @@ class WaitingStarter:
         context: Context,
         executor: ComposerExecutor,
         nodes: Mapping[str, LiveNode],
-        processes: Mapping[str, ExternalProcess],
+        elsewhere: Elsewhere,
         positions: SourceMap,
     ) -> None:
         self._context = context
         self._executor = executor
         self._remotes: dict[str, RemoteLifecycle] = {}
         self._nodes = nodes
-        self._processes = processes
+        self._elsewhere = elsewhere
         self._positions = positions
         self._notices: dict[DataPath | int, WaitNotice] = {}
         # When the conditions of a waiter held first.
@@ -168,7 +175,7 @@ class WaitingStarter:
     ) -> bool:
         if condition.kind == 'process':
             state: Any = condition.state
-            return self._processes[condition.name].has_come_to(state)
+            return self._elsewhere.find_process(condition.name).has_come_to(state)
         name = waiter.resolve(condition)
         if condition.state is None:
             return graph.has(condition.kind, name)
@@ -201,19 +208,20 @@ class WaitingStarter:
 
     def _is_hopeless(self, condition: ConditionSpec) -> bool:
         """Return whether it waits for a process that has ended for good."""
-        return condition.kind == 'process' and self._processes[condition.name].is_done
+        if condition.kind != 'process':
+            return False
+        return self._elsewhere.find_process(condition.name).is_done
 
     def _hidden(self) -> frozenset[str]:
         """Return the full names of the nodes that have not started."""
-        closed = [node for node in list(self._nodes.values()) if not node.gate.is_open]
-        return frozenset(node.full_name for node in closed)
+        return find_hidden(self._nodes) | self._elsewhere.find_hidden()
 
     def _error(self, waiter: Waiter, condition: ConditionSpec, graph: RosGraph) -> StartError:
         span = self._positions.value(condition.path)
         who = f'{waiter.label} ({span.source.name}:{span.line})'
         waited = f'waited {condition.timeout_sec:g} s for the {condition.kind}'
         if condition.kind == 'process':
-            process = self._processes[condition.name]
+            process = self._elsewhere.find_process(condition.name)
             waited = 'waits for the process' if process.is_done else waited
             what = {'ended': ' to end', 'succeeded': ' to succeed'}.get(condition.state or '', '')
             message = f"{who} {waited} '{condition.name}'{what}: {process.state}"

@@ -12,6 +12,7 @@ from rclpy.publisher import Publisher
 
 from composer.errors import ExitCode
 from composer.names import expand_name
+from composer.processes.guardian_client import NoGuardian
 from composer.runtime.logs import system_logger
 from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.system import System
@@ -52,8 +53,7 @@ class SimulatedRun(System):
     ) -> None:
         self._threads = threads
         self._on_created = on_created
-        guardian: Any = _NoGuardian()
-        super().__init__(reading, guardian)
+        super().__init__(reading, NoGuardian(owns_process=False))
         nothing: Any = _Nothing()
         self._control = self._hang_watcher = self._graph_watcher = nothing
         self._parameter_services = nothing
@@ -157,20 +157,6 @@ def observed_log(observe: Observe, *, is_shown: bool) -> Iterator[None]:
         yield
     finally:
         _rclpy.rclpy_logging_rcutils_log = log
-
-
-class _NoGuardian:
-    """What ends a process that hangs; a simulation has its own limit of real time."""
-
-    owns_process = False
-    mark = 0
-
-    def allow(self, _stop_sec: float) -> None:
-        """Do nothing."""
-
-    def begin_stop(self) -> bool:
-        """Tell that the stop goes on."""
-        return True
 
 
 class _Nothing:

@@ -185,7 +185,7 @@ class SimulatedSystem:
         folders = project_search_path(self._system.files)
         self._stack.enter_context(project_on_path(folders))
         before = self._stack.enter_context(forgotten_modules(folders))
-        functions, _findings = import_behaviours(context)
+        functions, _findings = import_behaviours(context, context.spec)
         if self._watch is not None:
             for path in list_project_modules(folders, before).values():
                 self._watch.note_numpy_clocks(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
@@ -17,16 +17,19 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.paths import PathError, resolve_path
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import list_named_files
+from composer.python_source.module_finder import project_search_path
 from composer.records import record
 from composer.runtime.behaviours.import_check import import_behaviours
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.language.bindings import Binding
     from composer.planning.snapshot import Snapshot
     from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.workers.workers import Workers
 
 Report: TypeAlias = 'Callable[[list[Diagnostic]], None]'
 
@@ -93,17 +96,29 @@ class SystemReader:
 
 
 def import_reading(
-    context: CheckContext, snapshot: Snapshot, report: Report = show_findings
+    context: CheckContext,
+    snapshot: Snapshot,
+    report: Report = show_findings,
+    workers: Workers | None = None,
+    stale: Collection[str] = (),
 ) -> Reading | None:
     """Import the behaviours of a system; return `None` if they have errors.
 
     Args:
         report: Takes the findings; by default they are printed.
+        workers: Import those of their nodes; `None` if all are imported here.
+        stale: The modules that workers execute anew.
     """
     from composer.runtime.rewiring.reading import Reading
 
     system = context.system
-    functions, findings = import_behaviours(context)
+    own = snapshot.spec
+    elsewhere: Iterator[tuple[Binding, Any]] = iter(())
+    if workers is not None and workers.are_used:
+        own = own.in_worker('')
+        search_path = project_search_path(system.files)
+        elsewhere = workers.import_behaviours(snapshot, search_path, stale)
+    functions, findings = import_behaviours(context, own, elsewhere)
     # The check has already reported comments that silence nothing.
     comments = IgnoreComments(system.positions.source)
     shown = [each for each in findings if not comments.silence(each)]

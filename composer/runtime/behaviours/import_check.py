@@ -13,37 +13,50 @@ from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
     import inspect
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.bindings import Binding
+    from composer.language.specs import SystemSpec
     from composer.python_source.modules import FunctionKind
 
-_Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
+Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
 
 _OF_ROS = ('rclpy', 'rcl_interfaces', 'builtin_interfaces', 'rosidl_runtime_py')
 _OF_ROS_ENDINGS = ('_msgs', '_srvs', '_interfaces')
 
 
 def import_behaviours(
-    context: CheckContext,
+    context: CheckContext, spec: SystemSpec, elsewhere: Iterable[tuple[Binding, Any]] = ()
 ) -> tuple[dict[str, Callable[..., Any]], list[Diagnostic]]:
-    """Import every behaviour; return the functions by name, and the findings about them."""
+    """Import every behaviour; return the functions by name, and the findings about them.
+
+    Args:
+        spec: The part of the system that runs in this process.
+        elsewhere: The behaviours of other processes, with the shape of each, or the text and the
+            help of an error.
+    """
     functions: dict[str, Callable[..., Any]] = {}
     findings: list[Diagnostic] = []
     # Many nodes may have the same.
-    shapes: dict[str, _Shape] = {}
-    for binding in system_bindings(context.spec):
-        spec = binding.behaviour
-        if spec.name not in shapes:
+    shapes: dict[str, Shape] = {}
+    for binding in system_bindings(spec):
+        behaviour = binding.behaviour
+        if behaviour.name not in shapes:
             try:
-                functions[spec.name] = function = behaviours.import_behaviour(spec)
+                functions[behaviour.name] = function = behaviours.import_behaviour(behaviour)
             except behaviours.BehaviourImportError as error:
                 findings.append(_explain(context, binding, error))
                 continue
-            shapes[spec.name] = _shape_of(function)
-        findings += check_behaviour_call(context, binding, *shapes[spec.name])
+            shapes[behaviour.name] = shape_of(function)
+        findings += check_behaviour_call(context, binding, *shapes[behaviour.name])
+    for binding, (first, second) in elsewhere:
+        if isinstance(first, str):
+            failure = behaviours.BehaviourImportError(first, help=second)
+            findings.append(_explain(context, binding, failure))
+        else:
+            findings += check_behaviour_call(context, binding, first, second)
     return functions, findings
 
 
@@ -85,10 +98,10 @@ class ImportCheck:
             elif not (was_told and isinstance(error.__cause__, ImportError)):
                 yield _explain(context, binding, error)
             return
-        yield from check_behaviour_call(context, binding, *_shape_of(function))
+        yield from check_behaviour_call(context, binding, *shape_of(function))
 
 
-def _shape_of(function: Callable[..., Any]) -> _Shape:
+def shape_of(function: Callable[..., Any]) -> Shape:
     """Return how a function runs, and how it is called."""
     if isinstance(function, behaviours.Method):
         function = function.stand_in()

@@ -12,7 +12,7 @@ from composer.runtime.control.protocol import VERSION
 from composer.runtime.health.system_state import Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from composer.planning.snapshot import Snapshot
     from composer.runtime.costs.process_costs import ProcessCosts
@@ -26,13 +26,13 @@ _P99 = 0.99
 _NS_PER_MS = 1e6
 
 
-def status_answer(
+def describe_status(
     state: SystemState,
     nodes: Sequence[str],
     components: Sequence[str],
     diagnostics: DiagnosticsPublisher | None,
-) -> Outcome:
-    """Return what a system says of itself.
+) -> dict[str, Any]:
+    """Return what a system, or a worker, says of itself.
 
     Args:
         nodes: Their full names.
@@ -41,37 +41,74 @@ def status_answer(
     """
     health = None if diagnostics is None else _summarize(diagnostics)
     names = {'nodes': list(nodes), 'components': list(components)}
-    return _answer({**state.document(), **names, 'health': health})
+    return {**state.document(), **names, 'health': health}
 
 
-def top_answer(
-    state: SystemState, diagnostics: DiagnosticsPublisher | None, deliveries: Deliveries
+def status_answer(
+    own: dict[str, Any], workers: Mapping[str, dict[str, Any]], states: Sequence[dict[str, Any]]
 ) -> Outcome:
+    """Return what a system says of itself and of its workers.
+
+    Args:
+        own: What `describe_status` says of the process of the system.
+        workers: What it says of each worker that answers.
+        states: The state of each worker.
+    """
+    healths = [each['health'] for each in (own, *workers.values()) if each['health']]
+    merged = {
+        'lifecycles': {
+            node: state
+            for one in (own, *workers.values())
+            for node, state in one['lifecycles'].items()
+        },
+        'health': max(healths, key=lambda each: _LEVELS.index(each['level']), default=None),
+        'workers': list(states),
+    }
+    return _answer({**own, **merged})
+
+
+def describe_top(
+    state: SystemState, diagnostics: DiagnosticsPublisher, deliveries: Deliveries
+) -> dict[str, Any]:
     """Return the health of each entity in the last period, and have more measured in the next.
 
     Args:
         deliveries: Which way publishers and clients deliver, which have no figures else.
     """
-    if diagnostics is None:
-        text = "the system measures nothing: its file says 'diagnostics: false'"
-        return Outcome(succeeded=False, text=text)
     diagnostics.watch()
     latest = diagnostics.latest
-    return _answer(
-        {
-            'name': state.name,
-            'period': latest.number,
-            'period_sec': diagnostics.period_sec,
-            'has_cpu': latest.costs is not None,
-            'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
-            'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
-            + [_describe_delivery(key, each) for key, each in deliveries.items()]
-            + [
-                _describe_figureless((node, Owner('lifecycle', each)), None, '')
-                for node, each in state.find_lifecycles().items()
-            ],
-        }
-    )
+    return {
+        'name': state.name,
+        'period': latest.number,
+        'period_sec': diagnostics.period_sec,
+        'has_cpu': latest.costs is not None,
+        'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
+        'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
+        + [_describe_delivery(key, each) for key, each in deliveries.items()]
+        + [
+            _describe_figureless((node, Owner('lifecycle', each)), None, '')
+            for node, each in state.find_lifecycles().items()
+        ],
+    }
+
+
+def top_answer(own: dict[str, Any] | None, workers: Mapping[str, dict[str, Any]]) -> Outcome:
+    """Return the health of each entity, in the system's process and in its workers.
+
+    Args:
+        own: See `describe_top`; `None` if nothing is measured.
+        workers: The same of each worker that answers.
+    """
+    if own is None:
+        text = "the system measures nothing: its file says 'diagnostics: false'"
+        return Outcome(succeeded=False, text=text)
+    parts = {'': own, **workers}
+    merged = {
+        key: [{**each, 'worker': name} for name, part in parts.items() for each in part[key]]
+        for key in ('processes', 'entities')
+    }
+    has_cpu = all(each['has_cpu'] for each in parts.values())
+    return _answer({**own, 'has_cpu': has_cpu, **merged})
 
 
 def snapshot_answer(snapshot: Snapshot) -> Outcome:
@@ -100,7 +137,6 @@ def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
     level, message = _find_level(report)
     return {
         'node': node,
-        'worker': '',
         'kind': owner.kind,
         'name': owner.name,
         'key': owner.key,
@@ -133,7 +169,6 @@ def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[s
     none = ('calls', 'errors', 'dropped', 'late', 'skipped')
     return {
         'node': node,
-        'worker': '',
         'kind': owner.kind,
         'name': owner.name,
         'key': owner.key,
@@ -150,7 +185,6 @@ def _describe_process(costs: ProcessCosts) -> dict[str, Any]:
     """Return what a process costs as a whole."""
     waits = costs.waits
     return {
-        'worker': '',
         'pid': os.getpid(),
         'cpu': costs.cpu,
         'gil': costs.held,

@@ -16,7 +16,12 @@ from rclpy.parameter import Parameter
 
 from composer.errors import ExitCode, StartError
 from composer.runtime.control import protocol
-from composer.runtime.control.answers import status_answer, top_answer
+from composer.runtime.control.answers import (
+    describe_status,
+    describe_top,
+    status_answer,
+    top_answer,
+)
 from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
@@ -49,6 +54,7 @@ class ControlNode:
         health: The health of the system's entities.
         calls: Knows the calls that run.
         commands: `None` if the system is not to be asked over ROS.
+        worker: The worker whose node this is; empty for the process of the system.
     """
 
     def __init__(
@@ -58,7 +64,9 @@ class ControlNode:
         health: HealthRegistry,
         calls: CallWatcher,
         commands: Commands | None,
+        worker: str = '',
     ) -> None:
+        self._worker = worker
         self._system = system
         self._commands = commands
         self._health = health
@@ -86,6 +94,9 @@ class ControlNode:
             StartError: Another system has the name.
         """
         self._context, self._ros_arguments = context, ros_arguments
+        if self._worker:
+            self._thread.start()
+            return
         state = self._system.state
         self._claim = NameClaim(protocol.node_name(state.name), context.get_domain_id())
         about = {**state.who(), 'is_asked': self._commands is not None, 'log': find_log()}
@@ -153,8 +164,9 @@ class ControlNode:
             system_logger.error(f'the system cannot be asked over ROS: {error}')
 
     def _create_node(self) -> RosNode:
+        name = self._system.state.name
         return RosNode(
-            protocol.node_name(self._system.state.name),
+            protocol.node_name(f'{name}__{self._worker}' if self._worker else name),
             context=self._context,
             cli_args=['--ros-args', *self._ros_arguments],
             use_global_arguments=False,
@@ -213,14 +225,25 @@ class ControlNode:
         if not self._ended.is_set():
             system_logger.error(text)
 
-    def _status(self) -> Outcome:
+    def describe_status(self) -> dict[str, Any]:
+        """Return what this process says of itself, without its workers."""
         system = self._system
-        return status_answer(
+        return describe_status(
             system.state, system.list_nodes(), system.list_components(), self._diagnostics
         )
 
+    def describe_top(self) -> dict[str, Any] | None:
+        """Return the health of the entities of this process; `None` if nothing is measured."""
+        if self._diagnostics is None:
+            return None
+        return describe_top(self._system.state, self._diagnostics, self._system.find_deliveries())
+
+    def _status(self) -> Outcome:
+        workers = self._system.workers
+        return status_answer(self.describe_status(), workers.ask('status'), workers.describe())
+
     def _top(self) -> Outcome:
-        return top_answer(self._system.state, self._diagnostics, self._system.find_deliveries())
+        return top_answer(self.describe_top(), self._system.workers.ask('top'))
 
     def _give_way(self, rival: Mapping[str, Any]) -> None:
         system_logger.error(f'{self._describe_rival(rival)}; so this one ends')

@@ -24,6 +24,16 @@ if TYPE_CHECKING:
     from composer.runtime.health.deliveries import Deliveries
 
 
+class AskedWorkers(Protocol):
+    """The workers of a system that is asked."""
+
+    def ask(self, what: str) -> dict[str, Any]:
+        """Return what each worker answers that does, by name."""
+
+    def describe(self) -> list[dict[str, Any]]:
+        """Return the state of each worker, with the nodes that run in it."""
+
+
 class ControlledSystem(Protocol):
     """A system that is asked."""
 
@@ -34,6 +44,10 @@ class ControlledSystem(Protocol):
     @property
     def state(self) -> SystemState:
         """Its state."""
+
+    @property
+    def workers(self) -> AskedWorkers:
+        """Its workers."""
 
     def list_nodes(self) -> list[str]:
         """Return the full names of its nodes."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import OnError, QosSpec
     from composer.ros_parameters.file_reader import ParameterEntry
+    from composer.runtime.elsewhere import Elsewhere
     from composer.runtime.health.statistics import HealthRegistry
     from composer.runtime.messages.local_delivery import LocalTopics
     from composer.runtime.messages.local_services import LocalServices
@@ -91,6 +92,7 @@ class SystemHandle:
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
         services: Hands requests over between its nodes.
+        elsewhere: What of the system is not in the nodes of this process.
         create_entity: Creates one entity more of a `LiveNode`, of a section, from its record.
         observe: Takes what happens, with a kind of `Event`, a node, a name and a value; `None` if
             nobody wants to know.
@@ -114,6 +116,7 @@ class SystemHandle:
     health: HealthRegistry
     topics: LocalTopics
     services: LocalServices
+    elsewhere: Elsewhere
     create_entity: Callable[[Any, str, Any], LiveEntity]
     observe: Observe | None = None
     is_outdated: Callable[[], bool] = never

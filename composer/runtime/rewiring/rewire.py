@@ -70,6 +70,7 @@ class Rewiring:
         self._states: dict[str, str] = {}
         # The processes that ran on demand before they were ended.
         self._running: set[str] = set()
+        self._go_on: Callable[[], None] = lambda: None
 
     def wait_for_goals(
         self, plan: Plan, aborts: Callable[[], bool], is_outdated: Callable[[], bool]
@@ -88,14 +89,22 @@ class Rewiring:
             self._transaction.on_undo(server.retire, is_retired=False)
         wait_for_goals(servers, self._handle.stop, aborts, is_outdated)
 
+    def make_way(self, full_names: Iterable[str]) -> None:
+        """End nodes that begin elsewhere.
+
+        Raises:
+            ComposerError: One of them hangs.
+        """
+        self._end_nodes(name for name in full_names if name in self._nodes)
+
     def apply(self, plan: Plan, is_outdated: Callable[[], bool]) -> None:
-        """Do all that a plan says.
+        """Do all that a plan says; what goes is still there until `commit`.
 
         Args:
             is_outdated: Returns whether there is a newer edit, for which an `on_start` is left.
 
         Raises:
-            ComposerError: Something failed, and everything is as before.
+            ComposerError: Something failed, and is to be undone.
         """
         self._handle.is_outdated = is_outdated
         try:
@@ -105,22 +114,22 @@ class Rewiring:
             if at_first:
                 self._end_clashing(plan, clashing)
             self._exchange_nodes_and_processes(plan, {each[0] for each in clashing})
-            go_on = self._pause({each.target[0] for each in plan.operations})
+            self._go_on = self._pause({each.target[0] for each in plan.operations})
             if not at_first:
                 self._end_clashing(plan, clashing)
             self._change_nodes(plan, clashing)
-        except BaseException:
-            self._undo_all()
-            raise
         finally:
             self._handle.is_outdated = never
+
+    def commit(self) -> None:
+        """Let go of what was there before."""
         # Before nodes are removed, which may take long.
-        go_on()
+        self._go_on()
         self._transaction.commit()
         self._forget_health()
 
-    def _undo_all(self) -> None:
-        self._handle.is_outdated = never
+    def undo(self) -> None:
+        """Let everything be as before."""
         self._read_as(self._old)
         self._transaction.undo()
         self._forget_health()

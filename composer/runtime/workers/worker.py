@@ -1,0 +1,181 @@
+"""One worker, as the process of the system sees it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError, ExitCode, StartError
+from composer.processes.channel import ChannelLostError
+from composer.processes.external_process import describe_end
+from composer.processes.worker_supervisor import ConnectedProcess, worker_rules
+
+if TYPE_CHECKING:
+    from composer.language.specs import WorkerSpec
+    from composer.processes.channel import Channel, Functions
+    from composer.processes.worker_supervisor import WorkerSupervisor
+    from composer.runtime.health.system_state import Outcome
+    from composer.runtime.workers.assignment import Assignment, ImportRequest
+
+# How long it may take until it is known how a process has ended.
+_END_SEC = 1.0
+# What a worker does at its start, in this order.
+_STEPS = ('create', 'run_on_start', 'open', 'start_waiting', 'be_up')
+
+
+class Worker:
+    """A worker: its process, and what it runs.
+
+    Attributes:
+        request: What it was last told to import.
+        assignment: What it runs, or is to run once it is started again.
+        is_up: Whether all its nodes have started.
+    """
+
+    def __init__(
+        self, spec: WorkerSpec, supervisor: WorkerSupervisor, functions: Functions
+    ) -> None:
+        self.spec = spec
+        self.process = ConnectedProcess(spec, functions)
+        self.request: ImportRequest | None = None
+        self.assignment: Assignment | None = None
+        self.is_up = False
+        self._supervisor = supervisor
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.spec.name
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its process runs."""
+        run = self.process.run
+        return run is not None and run.code is None
+
+    @property
+    def channel(self) -> Channel:
+        """The connection to its process."""
+        assert self.process.channel is not None  # noqa: S101 - it was spawned
+        return self.process.channel
+
+    @property
+    def nodes(self) -> list[str]:
+        """The full names of the nodes that it runs, or is to run."""
+        if self.assignment is None:
+            return []
+        return [each.full_name for each in self.assignment.snapshot.spec.nodes.values()]
+
+    def spawn(self) -> None:
+        """Start its process.
+
+        Raises:
+            StartError: It cannot be started.
+        """
+        self._supervisor.by_name[self.name] = self.process
+        self._supervisor.start(self.process)
+
+    def call(self, name: str, *arguments: Any, timeout_sec: float | None = None) -> Any:
+        """Call a function of its process.
+
+        Raises:
+            ComposerError: The function raised it, or the process has gone.
+        """
+        return self.channel.call(name, *arguments, timeout_sec=timeout_sec)
+
+    def do(self, step: str) -> Any:
+        """Do one step of its start; see `WorkerProcess`.
+
+        Raises:
+            StartError: It failed.
+        """
+        arguments = (self.assignment,) if step == 'create' else ()
+        try:
+            result = self.call(step, *arguments)
+        except ChannelLostError as error:
+            message = f"worker '{self.name}' {self._describe_end()}"
+            raise StartError(message) from error
+        if step == 'be_up':
+            self.is_up = True
+            self.keep_to_rules()
+        return result
+
+    def start(self) -> None:
+        """Do all steps of its start, beside a system that is up.
+
+        Raises:
+            ComposerError: One failed.
+        """
+        for step in _STEPS:
+            self.do(step)
+
+    def begin_again(self) -> None:
+        """Run its nodes in a process that was started anew.
+
+        Raises:
+            ComposerError: They could not start.
+        """
+        self.call('import_behaviours', self.request)
+        self.call('keep_imports')
+        self.start()
+
+    def keep_to_rules(self) -> None:
+        """Have its process started again as the file says."""
+        self.process.change(worker_rules(self.spec))
+
+    def stop(self, timeout_sec: float) -> tuple[int, bool]:
+        """Stop its nodes and end its process.
+
+        Returns:
+            The exit code, and whether all behaviours have ended.
+        """
+        self.process.is_leaving = True
+        if not self.is_alive:
+            return ExitCode.DONE, True
+        try:
+            code, has_ended = self.call('stop', timeout_sec=timeout_sec)
+        except ComposerError:
+            return ExitCode.FAILED, False
+        run = self.process.run
+        if run is not None:
+            run.gone.wait(_END_SEC)
+        return code, has_ended
+
+    def remove(self, timeout_sec: float) -> None:
+        """Stop it, and have its process killed if it does not end."""
+        self.stop(timeout_sec)
+        if self._supervisor.by_name.get(self.name) is self.process:
+            self._supervisor.remove(self.name)
+
+    def restart_node(self, full_name: str) -> Outcome:
+        """Build a node anew."""
+        outcome: Outcome = self.call('restart_node', full_name)
+        return outcome
+
+    def describe(self) -> dict[str, Any]:
+        """Return its state as data."""
+        run = self.process.run
+        state = 'running' if self.is_alive and self.is_up else 'starting'
+        if not self.is_alive:
+            state = 'ended' if self.process.is_done else 'restarting'
+        return {
+            'name': self.name,
+            'state': state,
+            'pid': run.pid if run is not None and self.is_alive else None,
+            'restarts': self.process.restarts,
+            'nodes': self.nodes,
+        }
+
+    def _describe_end(self) -> str:
+        run = self.process.run
+        if run is not None:
+            run.ended.wait(_END_SEC)
+        if run is None or run.code is None:
+            return 'does not answer'
+        return f'{describe_end(run.code)} while it started'
+
+
+def drop_imports(worker: Worker) -> None:
+    """Have a worker go back to the modules that it had before."""
+    with suppress(ComposerError):
+        worker.call('drop_imports')

@@ -1,0 +1,15 @@
+"""The program of a worker: it runs the nodes that the process of the system tells it to."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+# Python has put the folder of this file first, whose modules are not to be imported by their
+# short names.
+sys.path[0] = str(Path(__file__).parents[3])
+
+if __name__ == '__main__':
+    from composer.runtime.workers.worker_process import main
+
+    main(sys.argv[1])
