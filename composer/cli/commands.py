@@ -24,6 +24,7 @@ from composer.cli.common.argument_types import (
     takes_topics,
 )
 from composer.cli.common.recording_options import RecordingOptions
+from composer.cli.exporting.declarations import export_command
 from composer.cli.recording.recording_commands import COMMANDS as RECORDING_COMMANDS
 from composer.cli.running.declarations import COMMANDS as RUNNING_COMMANDS
 from composer.cli.testing.declarations import test_command
@@ -593,5 +594,5 @@ def interfaces_show_command(name: str) -> int:
     return show(name)
 
 
-for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS, test_command):
+for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS, test_command, export_command):
     cli.add_command(_command)

@@ -6,25 +6,72 @@ must be escaped: https://www.freedesktop.org/software/systemd/man/latest/systemd
 
 from __future__ import annotations
 
+import os
+import pwd
 import re
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.processes.own_process import own_command
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-Scope: TypeAlias = Literal['user', 'system']
+    from composer.export.parts import Export, HostPart, Scope
 
 # What needs no quotes: nothing that systemd splits, expands or reads as a prefix.
 _PLAIN = re.compile(r'[\w/.,:=@+-]+', re.ASCII)
 _SPECIAL = re.compile(r'[\x00-\x1f\x7f"\\%]')
+_NO_FILE_NAME = re.compile(r'[^A-Za-z0-9_.-]')
 # systemd refuses programs with other characters in their paths, escaped or not.
 _PROGRAM = re.compile(r'/[^\x00-\x1f\x7f"\'\\]+')
 _NO_UNIT_NAME = re.compile(r'[^A-Za-z0-9:_.-]|^\.')
 # No limit of restarts: a robot whose sensor is plugged in late comes up all the same.
 _RESTART_DELAY_SEC = 5
 _WRONG_USAGE = 2
+
+
+def render_files(export: Export) -> dict[str, str]:
+    """Return the texts of the units, by their names.
+
+    Raises:
+        ComposerError: A path cannot stand in a unit.
+    """
+    return {unit_name(each.system, each.host): _render(export, each) for each in export.parts}
+
+
+def _render(export: Export, part: HostPart) -> str:
+    must_be_there = any(export.read.values())
+    file = f'%E/composer/{_NO_FILE_NAME.sub("_", part.system)}.env'
+    return render_unit(
+        [*own_command(), *export.arguments(part)],
+        description=f'{export.description} ({part.name})',
+        folder=str(export.folder),
+        stop_sec=part.stop_sec,
+        scope=part.scope,
+        environment=export.variables,
+        environment_file=f'{"" if must_be_there else "-"}{file}' if export.read else '',
+        user=part.user or pwd.getpwuid(os.getuid()).pw_name,
+        reload=[*own_command(), 'reload', part.name],
+        lowest_nice=part.lowest_nice,
+        comments=[*_explain(export, part)],
+    )
+
+
+def _explain(export: Export, part: HostPart) -> Iterator[str]:
+    name = unit_name(part.system, part.host)
+    is_user = part.scope == 'user'
+    folder = '~/.config/systemd/user' if is_user else '/etc/systemd/system'
+    manager = 'systemctl --user' if is_user else 'systemctl'
+    yield f"Put it into {folder}, then: {manager} daemon-reload; {manager} enable --now '{name}'"
+    if is_user:
+        yield 'It starts at the boot, not at the login, after: loginctl enable-linger'
+    if part.host:
+        yield f'For {part.host}, where the files and Composer lie in the folders of this computer.'
+    if export.read:
+        folder = '~/.config/composer' if is_user else '/etc/composer'
+        names = ', '.join(export.read)
+        yield f'EnvironmentFile: in {folder}, with a line NAME="value" for each of: {names}'
 
 
 def unit_name(system: str, host: str = '') -> str:

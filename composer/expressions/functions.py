@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -11,7 +12,9 @@ from composer.ament import explain_missing_package, find_share, list_packages
 from composer.programs import shell_environment
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+
+_readers: list[set[str]] = []
 
 
 class PackageError(TemplateRuntimeError):
@@ -26,12 +29,25 @@ class PackageError(TemplateRuntimeError):
         self.help = explain_missing_package(package, list_packages())
 
 
+@contextmanager
+def variables_noted() -> Iterator[set[str]]:
+    """Note which variables of the environment expressions read, until the block ends."""
+    names: set[str] = set()
+    _readers.append(names)
+    try:
+        yield names
+    finally:
+        _readers.pop()
+
+
 def read_environment(name: str, default: str | None = None) -> str:
     """Return a variable of the environment, or the default.
 
     Raises:
         TemplateRuntimeError: There is neither.
     """
+    for names in _readers:
+        names.add(name)
     value = shell_environment().get(name, default)
     if value is None:
         advice = f"give a default, as in env('{name}', 'none')"

@@ -32,12 +32,16 @@ _format = click.option(
 
 
 @click.command('ps')
+@_system
 @_format
-def ps_command(format_name: str) -> int:
-    """List the systems that run on this ROS graph."""
+def ps_command(system: str | None, format_name: str) -> int:
+    """List the systems that run on this ROS graph, or SYSTEM alone.
+
+    If there is no such system, or it does not answer, the exit code is 1.
+    """
     from composer.cli.running.ps import list_running
 
-    return list_running(format_name=format_name)
+    return list_running(system, format_name=format_name)
 
 
 @click.command('top')

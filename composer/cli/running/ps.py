@@ -22,12 +22,20 @@ _HEADER = ('NAME', 'STATE', 'HEALTH', 'NODES', 'UPTIME', 'LAST RELOAD', 'HOST', 
 _LONGEST_NOTE = 200
 
 
-def list_running(*, format_name: str) -> int:
-    """Print the systems that run; return the exit code."""
+def list_running(name: str | None, *, format_name: str) -> int:
+    """Print the systems that run; return the exit code.
+
+    Args:
+        name: The only one to print; `None` for all.
+
+    Raises:
+        ComposerError: No system of that name runs.
+    """
     with Client() as client:
         discovery = Discovery(client)
-        systems = discovery.find_all()
-        silent = discovery.find_silent(systems)
+        systems = discovery.find_all() if name is None else [discovery.find(name)]
+        silent = discovery.find_silent(systems) if name is None else []
+    code = ExitCode.DONE if name is None or systems[0].status else ExitCode.FAILED
     # Those are stopped, say, and so no longer on the graph.
     unnamed = [
         {'name': '?', 'state': 'no answer', 'host': gethostname(), 'pid': each} for each in silent
@@ -35,7 +43,7 @@ def list_running(*, format_name: str) -> int:
     if format_name == 'json':
         documents = [_document(each) for each in systems]
         click.echo(json.dumps({'version': 1, 'systems': documents + unnamed}, indent=2))
-        return ExitCode.DONE
+        return code
     if not systems and not unnamed:
         click.echo('no system runs on this ROS graph', err=True)
         return ExitCode.DONE
@@ -45,7 +53,7 @@ def list_running(*, format_name: str) -> int:
         *([str(each.get(key.lower(), '')) for key in _HEADER] for each in unnamed),
     ]
     click.echo('\n'.join([*render_table(_HEADER, rows), *notes]))
-    return ExitCode.DONE
+    return code
 
 
 def _document(system: RunningSystem) -> dict[str, object]:

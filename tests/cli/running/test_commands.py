@@ -121,6 +121,10 @@ def test_several_systems_are_told_apart(compose, composer):
     assert errors.endswith('name one of them: first, second\n')
     code, _, errors = composer('reload', 'secnd')
     assert (code, errors.splitlines()[-1]) == (1, "  help: did you mean 'second'?")
+    code, listed, _ = composer('ps', 'first', '--format', 'json')
+    assert (code, [each['name'] for each in json.loads(listed)['systems']]) == (0, ['first'])
+    code, listed, _ = composer('ps', 'fourth')
+    assert (code, listed) == (1, '')
     code, _, errors = composer('down', 'third')
     assert (code, errors) == (
         1,

@@ -1,0 +1,190 @@
+"""Each form of each shipped system passes the check of the program that reads it."""
+
+import json
+import re
+import shlex
+from importlib import resources
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft7Validator
+
+import composer
+from composer.cli import main as cli
+from composer.export.systemd import unit_name
+
+ROOT = Path(composer.__file__).parents[1]
+CONFIGS = sorted((ROOT / 'configs').glob('*.yaml'))
+ARGUMENTS = {
+    'add_two_ints_client': ['1', '2'],
+    'calculator_client': ['1', '2'],
+}
+FLEET = """
+version: 1
+description: 100 % a "fleet" of ${HOME} \\
+defaults: {host: base}
+workers:
+  vision: {host: jetson, nice: -5}
+nodes:
+  driver:
+    publishers: {image: {type: std_msgs/msg/String, external: true}}
+  detector:
+    worker: vision
+    publishers: {found: {type: std_msgs/msg/String, external: true}}
+processes:
+  recorder: {command: [sleep, '1'], host: jetson, stop: {timeout: 30}}
+"""
+
+
+@pytest.fixture
+def export(capsys, monkeypatch):
+    """Return what exports a system and returns what was printed; from a folder if one is given."""
+
+    def export(form, *words, folder=ROOT, fails=False):
+        monkeypatch.chdir(folder)
+        image = ['--image', 'robot:1'] if form == 'kubernetes' else []
+        code = cli.run(['export', form, *image, *map(str, words)])
+        captured = capsys.readouterr()
+        assert (code != 0) == fails, captured.err
+        return captured.err if fails else captured.out
+
+    return export
+
+
+@pytest.fixture
+def project(tmp_path):
+    """Return what makes a project with a system in it, and returns the file."""
+
+    def make(text, name='robot'):
+        (tmp_path / 'pyproject.toml').touch()
+        file = tmp_path / 'configs' / f'{name}.yaml'
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        return file
+
+    return make
+
+
+def check_compose(text):
+    pytest.importorskip('check_jsonschema')
+    vendored = resources.files('check_jsonschema') / 'builtin_schemas/vendor/compose-spec.json'
+    data = yaml.safe_load(text)
+    Draft7Validator(json.loads(vendored.read_text())).validate(data)
+    return data
+
+
+def check_kubernetes(text):
+    kubernetes_validate = pytest.importorskip('kubernetes_validate')
+    documents = [*yaml.safe_load_all(text)]
+    for each in documents:
+        kubernetes_validate.validate(each, '1.30', strict=True)
+    return documents
+
+
+def units_of(text):
+    """Return the printed units by their names."""
+    _, *parts = re.split(r'^# (composer-\S+\.service)\n', text, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def value_of(unit, key):
+    return [line.partition('=')[2] for line in unit.splitlines() if line.startswith(f'{key}=')]
+
+
+@pytest.mark.parametrize('config', CONFIGS, ids=lambda each: each.stem)
+def test_a_shipped_system_is_a_unit(export, verify_unit, config):
+    text = export('systemd', config, *ARGUMENTS.get(config.stem, ()))
+    assert verify_unit(f'composer-{config.stem}.service', text, 'user') == (0, '')
+
+
+@pytest.mark.parametrize('config', CONFIGS, ids=lambda each: each.stem)
+def test_a_shipped_system_is_a_compose_file(export, config):
+    words = ARGUMENTS.get(config.stem, [])
+    data = check_compose(export('compose', config, *words))
+    (service,) = data['services'].values()
+    assert service['command'] == ['composer', 'up', f'/project/configs/{config.name}', *words]
+
+
+@pytest.mark.parametrize('config', CONFIGS, ids=lambda each: each.stem)
+def test_a_shipped_system_is_a_manifest_with_all_its_files(export, tmp_path, config):
+    words = ARGUMENTS.get(config.stem, [])
+    files, workload = check_kubernetes(export('kubernetes', config, *words))
+    pod = workload['spec']['template']['spec']
+    assert pod['containers'][0]['args'][2:] == [f'/project/configs/{config.name}', *words]
+    items = pod['volumes'][0]['configMap']['items']
+    assert {each['key'] for each in items} == {*files['data'], *files.get('binaryData', ())}
+    # What the pod will see is a system without errors.
+    for each in items:
+        path = tmp_path / each['path']
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(files['data'][each['key']])
+    export('systemd', f'configs/{config.name}', *words, folder=tmp_path)
+
+
+def test_each_host_has_its_part(export, project, verify_unit):
+    file = project(FLEET)
+    units = units_of(export('systemd', file, '--system'))
+    assert sorted(units) == ['composer-robot@base.service', 'composer-robot@jetson.service']
+    for host in ('base', 'jetson'):
+        unit = units[f'composer-robot@{host}.service']
+        assert shlex.split(value_of(unit, 'ExecStart')[0])[-2:] == ['--host', host]
+        assert verify_unit(f'composer-robot@{host}.service', unit, 'system') == (0, '')
+    assert value_of(units['composer-robot@jetson.service'], 'LimitNICE') == ['-5']
+    assert value_of(units['composer-robot@jetson.service'], 'TimeoutStopSec') == ['55']
+    assert value_of(units['composer-robot@base.service'], 'TimeoutStopSec') == ['25']
+
+    services = check_compose(export('compose', file))['services']
+    assert {name: each['profiles'] for name, each in services.items()} == {
+        'base': ['base'],
+        'jetson': ['jetson'],
+    }
+    assert services['jetson']['stop_grace_period'] == '55s'
+    assert services['jetson']['cap_add'] == ['SYS_NICE']
+    assert services['jetson']['healthcheck']['test'][-1] == 'robot@jetson'
+
+    _files, *workloads = check_kubernetes(export('kubernetes', file))
+    assert [each['metadata']['name'] for each in workloads] == ['robot-base', 'robot-jetson']
+    pods = [each['spec']['template']['spec'] for each in workloads]
+    assert [each['nodeSelector']['kubernetes.io/hostname'] for each in pods] == ['base', 'jetson']
+    assert [each['terminationGracePeriodSeconds'] for each in pods] == [25, 55]
+    assert pods[1]['containers'][0]['args'][-2:] == ['--host', 'jetson']
+
+
+def test_a_part_that_nobody_runs_is_an_error(export, project):
+    text = FLEET.replace('defaults: {host: base}\n', '')
+    assert export('systemd', project(text), fails=True).endswith(
+        "\nerror: node 'driver' has no host, and others have: nobody would run it\n"
+        "  help: write 'host:' there, or under 'defaults:'\n"
+    )
+
+
+ODD = ['a b', '100%', '%h', '$HOME', '${HOME}', '$$', '$(HOME)', '"q"', "'q'", 'back\\', 'ü机']
+ODD += ['yes', '1e3', '0x1', '1:30', 'null', '#x', 'a: b', '- a', '{x}', '']
+ODD_SYSTEM = f"""
+version: 1
+args: {{{', '.join(f'a{count}: {{type: string}}' for count in range(len(ODD)))}}}
+nodes:
+  one: {{}}
+"""
+
+
+@pytest.mark.parametrize(
+    'name', ['a b', '100%', '$HOME', '"q"', "o'q", 'ünï 机', 'yes', '-x', 'a@b']
+)
+def test_awkward_names_and_values_arrive_as_they_were(export, project, verify_unit, name):
+    file = project(ODD_SYSTEM, name)
+    folder = file.parent / 'a $x %h "q" ü'
+    folder.mkdir()
+    given = [f'a{count}:={each}' for count, each in enumerate(ODD)]
+    given += ['--set=nodes.one.description=$x %h "']
+    wanted = ['composer', 'up', f'/project/configs/{name}.yaml', *given]
+    # The programs replace names of variables, of which there are none.
+    (service,) = check_compose(export('compose', file, *given, folder=folder))['services'].values()
+    assert [each.replace('$$', '$') for each in service['command']] == wanted
+    assert service['working_dir'] == '/project/configs/a $$x %h "q" ü'
+    _files, workload = check_kubernetes(export('kubernetes', file, *given, folder=folder))
+    (container,) = workload['spec']['template']['spec']['containers']
+    assert [each.replace('$$', '$') for each in container['args']] == wanted
+    unit = unit_name(name)
+    assert verify_unit(unit, export('systemd', file, *given, folder=folder), 'user') == (0, '')
