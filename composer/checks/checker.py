@@ -33,7 +33,9 @@ from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
+from composer.checks.placement.crossing_messages import check_crossing_messages
 from composer.checks.placement.hosts_and_workers import check_hosts, check_workers
+from composer.checks.placement.shared_objects import check_shared_objects
 from composer.checks.process_parameters import check_process_parameters
 from composer.checks.processes import check_executables, check_processes
 from composer.checks.references import (
@@ -106,6 +108,8 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_blocked_groups,
     check_remap_rules,
     check_typos,
+    check_crossing_messages,
+    check_shared_objects,
 )
 # These look at the computer that the system runs on.
 _LOCAL_RULES = {

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks.absent_packages import AbsentPackages
-from composer.checks.checker import check_system
+from composer.checks.checker import check_in_context, create_context
+from composer.checks.placement.crossings import list_crossings
 from composer.cli.common.argument_types import split_words
 from composer.cli.common.file_selection import (
     SelectedSystem,
@@ -117,10 +118,13 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
             continue
         checked = []
         for given, combination, system in _load(selected, options):
-            findings = absent.leave_out(check_system(system, catalogue, further))
+            context = create_context(system, catalogue)
+            findings = absent.leave_out(check_in_context(system, context, further))
             kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
             nodes = len(system.spec.nodes) if system.spec else None
-            checked.append(CheckedFile(str(system.path), kept, nodes, given, combination))
+            crossings = tuple(map(str, list_crossings(context))) if context else ()
+            name = str(system.path)
+            checked.append(CheckedFile(name, kept, nodes, given, combination, crossings=crossings))
         files += name_combinations(checked)
     files += [_check_scenarios(path, catalogue, absent, options) for path in scenarios]
     unchecked = _list_unchecked(catalogue, imports, absent)

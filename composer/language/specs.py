@@ -376,6 +376,7 @@ class DeclaredNodeSpec:
         parameters: Those that are declared.
         declares_all_parameters: Whether it has no other parameters.
         process: The key of its process.
+        host: The host of its process.
     """
 
     name: str
@@ -387,6 +388,7 @@ class DeclaredNodeSpec:
     declares_all_parameters: bool
     process: str
     path: DataPath
+    host: str = ''
 
     @property
     def full_name(self) -> str:

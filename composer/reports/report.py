@@ -34,6 +34,7 @@ class CheckedFile:
         given: The layers, arguments and settings that the command line gives it.
         combination: The name of the combination that it was checked with, if any.
         cases: How many cases a scenario file has; `None` for a system.
+        crossings: What crosses between its workers and hosts, a line each.
     """
 
     name: str
@@ -42,6 +43,7 @@ class CheckedFile:
     given: str = ''
     combination: str | None = None
     cases: int | None = None
+    crossings: tuple[str, ...] = ()
 
     @property
     def variant(self) -> str:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Of a longer line, only the part around the finding is shown.
 _WIDEST_LINE = 160
+# Of more that crosses, the first lines are shown.
+_MOST_CROSSINGS = 10
 
 _COLOURS = {Severity.ERROR: 'red', Severity.WARNING: 'yellow'}
 
@@ -39,7 +41,18 @@ def render_files(report: Report, *, colour: bool, is_quiet: bool = False) -> str
         if not file.findings and counted and not is_quiet:
             name = f'{file.name} ({file.variant})' if file.variant else file.name
             blocks.append(f'{escape(name)}: ok, {counted}\n')
+        if file.crossings and not is_quiet:
+            blocks.append(_list_crossings(file))
     return ''.join(blocks)
+
+
+def _list_crossings(file: CheckedFile) -> str:
+    # Without findings there is a line with its name already.
+    header = f'{escape(file.name)}:\n' if file.findings else ''
+    lines = [f'crosses: {escape(each)}' for each in file.crossings[:_MOST_CROSSINGS]]
+    rest = len(file.crossings) - len(lines)
+    lines += [f'and {rest} more: composer graph shows all'] if rest else []
+    return header + ''.join(f'  {line}\n' for line in lines)
 
 
 def _count_content(file: CheckedFile) -> str:

@@ -125,7 +125,7 @@ def parse_process(name: str, data: dict[str, Any], path: DataPath) -> ProcessSpe
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
         on_demand=False,
-        nodes=(*nodes, *loaded),
+        nodes=tuple(replace(each, host=data.get('host', '')) for each in (*nodes, *loaded)),
         declares_all_ends=declares_all_ends,
         lifecycle=data.get('lifecycle'),
         components=components,

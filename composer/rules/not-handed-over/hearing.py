@@ -1,0 +1,2 @@
+def hear(node, words):
+    node.logger.info(words.data)
