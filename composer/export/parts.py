@@ -120,24 +120,21 @@ class Export:
         return ['up', *map(str, files), *host, *self.words]
 
 
+def list_hosts(spec: SystemSpec) -> list[str]:
+    """Return the names of the hosts that nodes and processes of a system run on."""
+    entries: list[NodeSpec | ProcessSpec] = [*spec.nodes.values(), *spec.processes.values()]
+    return sorted({each.host for each in entries} - {''})
+
+
 def list_parts(spec: SystemSpec, scope: Scope | None = None) -> list[HostPart]:
     """Return the parts of a system, by the names of their hosts.
 
     Args:
         scope: Whose service managers run them; `None` for what their hosts say.
-
-    Raises:
-        ComposerError: Only a part of the system has hosts.
     """
-    entries: list[NodeSpec | ProcessSpec] = [*spec.nodes.values(), *spec.processes.values()]
-    hosts = sorted({each.host for each in entries} - {''})
+    hosts = list_hosts(spec)
     if not hosts:
         return [_part(spec, '', scope)]
-    for each in entries:
-        if not each.host:
-            kind = str(each.path[0]).removesuffix('es' if each.path[0] == 'processes' else 's')
-            message = f"{kind} '{each.path[-1]}' has no host, and others have: nobody would run it"
-            raise ComposerError(message, help="write 'host:' there, or under 'defaults:'")
     return [_part(spec.on_host(host), host, scope) for host in hosts]
 
 

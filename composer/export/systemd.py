@@ -132,7 +132,8 @@ def render_unit(  # noqa: PLR0913 - a line of the unit each
         '# Composer tells when all of it is up; how long that may take, the system itself says.',
         'Type=notify',
         'TimeoutStartSec=infinity',
-        *([f'User={user}'] if user and is_system else []),
+        # Without it there is no HOME, where ROS has its logs.
+        *([f'User={user or "root"}'] if is_system else []),
         f'WorkingDirectory={_path(folder)}',
         *(f'Environment={quote(f"{name}={value}")}' for name, value in variables),
         *([f'EnvironmentFile={environment_file}'] if environment_file else []),

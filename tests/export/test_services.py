@@ -17,11 +17,13 @@ SYSTEM = """
 version: 1
 nodes:
   talker:
+    host: base
+    worker: speech
     publishers: {chatter: {type: std_msgs/msg/String, external: true}}
     timers:
       tick: {period: 0.1, publish: chatter, message: {data: "{{ env('ROBOT_WORD') }}"}}
 processes:
-  helper: {command: [sleep, '1000']}
+  helper: {command: [sleep, '1000'], host: arm}
 """
 
 
@@ -40,33 +42,41 @@ def robot(tmp_path, monkeypatch):
         yield folder / 'a robot.yaml'
 
 
-def test_a_unit_runs_reloads_and_stops_the_system(tmp_path, robot, service_manager):
-    units = tmp_path / 'units'
+def test_units_run_reload_and_stop_the_parts_of_a_system(tmp_path, robot, service_manager):
+    folder = tmp_path / 'units'
     words = [sys.executable, '-m', 'composer']
     subprocess.run(
-        [*words, 'export', 'systemd', robot.name, '--output', units], cwd=robot.parent, check=True
+        [*words, 'export', 'systemd', robot.name, '--output', folder], cwd=robot.parent, check=True
     )
-    (unit,) = units.iterdir()
+    units = {each.name: each.read_text() for each in sorted(folder.iterdir())}
+    names = ['composer-a\\x20robot@arm.service', 'composer-a\\x20robot@base.service']
+    assert [*units] == names
     environment = tmp_path / 'manager' / 'composer' / 'a_robot.env'
     environment.parent.mkdir(parents=True)
     environment.write_text('ROBOT_WORD="a word"\n')
     del os.environ['ROBOT_WORD']
     composer = shlex.join(words)
     output = service_manager(
-        {unit.name: unit.read_text()},
+        units,
         f"""
         set -e
-        unit={shlex.quote(unit.name)}
-        systemctl --user start "$unit"
-        echo "started: $(systemctl --user is-active "$unit")"
-        {composer} ps 'a robot' | grep -o 'a robot  *running'
-        systemctl --user reload "$unit"
-        systemctl --user stop "$unit"
-        systemctl --user show --property=Result,ActiveState "$unit"
-        {composer} ps 'a robot' || echo "gone: $?"
+        units={shlex.quote(shlex.join(names))}
+        eval "systemctl --user start $units"
+        {composer} ps 'a robot@arm' | grep -o 'a robot@arm  *running'
+        {composer} ps 'a robot@base' | grep -o 'a robot@base  *running'
+        eval "systemctl --user reload $units"
+        eval "systemctl --user stop $units"
+        eval "systemctl --user show --property=Result,ActiveState $units"
+        {composer} ps 'a robot@base' || echo "gone: $?"
         """,
     )
-    assert 'started: active' in output
-    assert 'running' in output
-    assert 'Result=success\nActiveState=inactive\n' in output
-    assert output.endswith('gone: 1\n')
+    assert output.splitlines() == [
+        'a robot@arm  running',
+        'a robot@base  running',
+        'Result=success',
+        'ActiveState=inactive',
+        '',
+        'Result=success',
+        'ActiveState=inactive',
+        'gone: 1',
+    ]

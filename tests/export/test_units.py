@@ -122,3 +122,4 @@ def test_a_unit_of_a_user_knows_no_target_of_the_system():
     assert 'User=' not in render(user='robot')
     assert 'After=network-online.target' in render(scope='system')
     assert 'User=robot' in render(scope='system', user='robot')
+    assert 'User=root' in render(scope='system')

@@ -10,6 +10,7 @@ import click
 
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
+from composer.checks.placement.hosts_and_workers import find_unplaced
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import list_files
@@ -22,6 +23,7 @@ from composer.export.parts import (
     choose_read,
     describe,
     find_variables,
+    list_hosts,
     list_parts,
 )
 from composer.export.project import find_root, list_project_files
@@ -71,6 +73,9 @@ def export(  # noqa: PLR0913 - one for each option
         system = load_given(paths, words, set_values)
         context = create_context(system, InterfaceCatalogue())
         findings = AbsentPackages().leave_out(check_in_context(system, context))
+    if context is not None and list_hosts(context.spec):
+        # Nobody would run what has none.
+        findings += find_unplaced(context)
     show_findings(findings)
     if context is None or has_errors(findings):
         return ExitCode.FAILED
