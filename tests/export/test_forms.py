@@ -187,3 +187,36 @@ def test_awkward_names_and_values_arrive_as_they_were(export, project, verify_un
     assert [each.replace('$$', '$') for each in container['args']] == wanted
     unit = unit_name(name)
     assert verify_unit(unit, export('systemd', file, *given, folder=folder), 'user') == (0, '')
+
+
+def test_a_config_map_has_what_behaviours_import_and_processes_run(export, project):
+    file = project("""
+version: 1
+nodes:
+  one: {on_start: robot_code.first:start}
+processes:
+  two: {command: [python3, tool.py]}
+""")
+    folder = file.parents[1] / 'robot_code'
+    folder.mkdir()
+    (folder / 'first.py').write_text(
+        'from robot_code import second\ndef start(node): second.run()\n'
+    )
+    (folder / 'second.py').write_text('import numpy\ndef run(): pass\n')
+    # Nothing of it is used, and Python imports it nevertheless.
+    (folder / 'third.py').touch()
+    (folder / 'fourth.py').touch()
+    tool = folder.parent / 'tool.py'
+    tool.touch(mode=0o755)
+    files, workload = check_kubernetes(export('kubernetes', file, folder=folder.parent))
+    assert files['data'].keys() == {
+        'configs_robot.yaml',
+        'pyproject.toml',
+        'robot_code_first.py',
+        'robot_code_second.py',
+        'robot_code_third.py',
+        'tool.py',
+    }
+    items = workload['spec']['template']['spec']['volumes'][0]['configMap']['items']
+    modes = {each['path']: each['mode'] for each in items}
+    assert (modes['tool.py'], modes['robot_code/first.py']) == (0o555, 0o444)
