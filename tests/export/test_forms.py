@@ -200,7 +200,7 @@ processes:
     folder = file.parents[1] / 'robot_code'
     folder.mkdir()
     (folder / 'first.py').write_text(
-        'from robot_code import second\ndef start(node): second.run()\n'
+        'from robot_code import second, third\ndef start(node): second.run()\n'
     )
     (folder / 'second.py').write_text('import numpy\ndef run(): pass\n')
     # Nothing of it is used, and Python imports it nevertheless.
