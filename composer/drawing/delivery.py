@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
+from composer.checks.placement.crossings import why_crossing
 from composer.language.qos import (
     BEST_OF_PUBLISHERS,
     QosError,
@@ -92,6 +93,7 @@ def _of_topic(
         offered = policies[publisher.path]
         matched = [each for each in channel.users if _matches(publisher, each, offered, policies)]
         reasons = [
+            *(why_crossing(publisher, each) for each in matched),
             '' if getattr(publisher.entity, 'local_delivery', True) else _TURNED_OFF,
             *(_why_sent(policies[each.path]) for each in (publisher, *matched)),
             PROCESS if any(each.is_declared for each in (publisher, *matched)) else '',
@@ -117,7 +119,8 @@ def _of_calls(
             outside = getattr(client.entity, 'external', False)
             yield client.path, Delivery('sent', OUTSIDE) if outside else Delivery()
             continue
-        called.append(_delivery([_why_call_is_sent(client, profiles), *served]))
+        elsewhere = [why_crossing(client, each) for each in channel.providers]
+        called.append(_delivery([*elsewhere, _why_call_is_sent(client, profiles), *served]))
         yield client.path, called[-1]
     for server in channel.providers:
         yield server.path, _join(called)

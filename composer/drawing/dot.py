@@ -38,6 +38,11 @@ _MARKS = {
     'warning': 'color="#bf8700", penwidth=2.5',
 }
 _MARK_COLOURS = {'error': '#d1242f', 'warning': '#9a6700'}
+_REGIONS = {
+    'namespace': 'style="rounded,dashed", color="#8c959f"',
+    'worker': 'style=rounded, color="#0969da", penwidth=1.5',
+    'host': 'style="rounded,bold", color="#57606a", penwidth=2',
+}
 _SMALL, _GREY = 9, '#57606a'
 
 
@@ -66,7 +71,7 @@ def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
         yield f'{indent}subgraph cluster_{number} {{'
         yield (
             f'{indent}  graph [label=<{_text(inner.title)}>, id="g{number}", '
-            f'class="namespace", labeljust=l, style="rounded,dashed", color="#8c959f"]'
+            f'class="{inner.kind}", labeljust=l, {_REGIONS[inner.kind]}]'
         )
         yield from _region(inner, depth + 1, numbers)
         yield f'{indent}}}'

@@ -6,6 +6,7 @@
   "name", "description",       of the system
   "nodes": [                   nodes and external processes
     {"id": "node:/robot/arm", "kind": "node" | "process", "name", "namespace", "description",
+     "host", "worker",                      where it runs; empty where the file does not say
      "findings": [0], "file", "line"}],
   "channels": [                topics, services, actions
     {"id": "topic:/robot/scan", "kind": "topic" | "service" | "action", "name",
@@ -20,7 +21,8 @@
      "type", "qos": {"depth": 5},           policies that differ from the default; durations in s
      "delivery": "local" | "sent" | "both" | "",   whether messages, calls and goals are handed
                                             over within the process; empty without another end
-     "delivery_reason": "durability: transient_local",   why they are sent
+     "delivery_reason": "durability: transient_local",   why they are sent; "other worker" and
+                                            "other host" for what crosses
      "findings", "file", "line"}],
   "waits": [{"node": <id>, "for": <id>, "file", "line"}],
   "findings": [                those of `composer check`; above they are indices into this list
@@ -76,6 +78,8 @@ def _node(picture: Picture, node: NodeBox) -> dict[str, Any]:
         'name': node.name,
         'namespace': node.namespace,
         'description': node.description,
+        'host': node.place[0],
+        'worker': node.place[1],
         'findings': list(node.findings),
         **_place_of(picture, node.path),
     }

@@ -15,6 +15,7 @@ from collections import defaultdict
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from composer.checks.placement.crossings import describe_place
 from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
@@ -134,7 +135,7 @@ def _describe_node(node: NodeBox) -> dict[str, Any]:
     return {
         'kind': node.kind,
         'name': name,
-        'facts': [node.description] if node.description else [],
+        'facts': [*filter(None, (node.description, describe_place(node.place)))],
     }
 
 

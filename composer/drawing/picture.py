@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.checks.placement.crossings import place_of
 from composer.drawing.delivery import deliveries_of
 from composer.drawing.finding_places import FindingPlaces
 from composer.drawing.qos_labels import differing_policies
+from composer.language.specs import ComponentSpec
 from composer.names import expand_name, expand_namespace, join_names
 from composer.records import record
 
@@ -15,10 +17,11 @@ if TYPE_CHECKING:
 
     from composer.checks.connections.topology import Endpoint, Topology
     from composer.checks.context import CheckContext
+    from composer.checks.placement.crossings import Place
     from composer.diagnostics import Diagnostic
     from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ComponentSpec, ConditionSpec, NodeSpec, ProcessSpec
+    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
 NodeKind: TypeAlias = Literal['node', 'process']
@@ -33,6 +36,7 @@ class NodeBox:
         id: Its kind and full name, as in `node:/robot/arm`; no two are the same.
         namespace: In full, as in `/robot`.
         findings: Its findings, as indices into those of the picture.
+        place: The host and the worker that it runs in; empty for those that the file names not.
     """
 
     id: str
@@ -42,6 +46,7 @@ class NodeBox:
     description: str
     path: DataPath
     findings: tuple[int, ...]
+    place: Place
 
 
 @record
@@ -55,6 +60,7 @@ class ChannelBox:
         external: The sides on which an end is outside the system, by `external: true`.
         path: The path of the end that is declared first.
         findings: Its findings, as indices into those of the picture.
+        place: The host and the worker that have all its ends; empty if none has.
     """
 
     id: str
@@ -65,6 +71,7 @@ class ChannelBox:
     external: tuple[Side, ...]
     path: DataPath
     findings: tuple[int, ...]
+    place: Place
 
 
 @record
@@ -161,8 +168,21 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:
             id_ += "'"
         taken.add(id_)
         yield NodeBox(
-            id_, kind, node.name, namespace, node.description, node.path, places.of_node(node.path)
+            id_,
+            kind,
+            node.name,
+            namespace,
+            node.description,
+            node.path,
+            places.of_node(node.path),
+            _place_of(context, node),
         )
+
+
+def _place_of(context: CheckContext, node: NodeSpec | ProcessSpec | ComponentSpec) -> Place:
+    if isinstance(node, ComponentSpec):
+        return context.spec.processes[node.container].host, ''
+    return node.host, getattr(node, 'worker', '')
 
 
 def _specs(
@@ -193,7 +213,15 @@ def _channels(topology: Topology, places: FindingPlaces) -> Iterator[ChannelBox]
             tuple(sides),
             ends[0].path,
             places.of_channel((channel.kind, channel.name)),
+            _common_place([place_of(end) for end in ends]),
         )
+
+
+def _common_place(places: Sequence[Place]) -> Place:
+    hosts, workers = ({place[part] for place in places} for part in (0, 1))
+    if len(hosts) > 1:
+        return '', ''
+    return hosts.pop(), workers.pop() if len(workers) == 1 else ''
 
 
 def _common_namespace(namespaces: Sequence[str]) -> str:

@@ -19,6 +19,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from composer.checks.placement.crossings import Place
     from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
 
 _REMARK_WIDTH = 44
@@ -71,16 +72,36 @@ class Line:
 
 @record
 class Region:
-    """A namespace, with the shapes in it that are in no deeper one."""
+    """A namespace, a host or a worker, with the shapes in it that are in no deeper region.
+
+    Attributes:
+        place: `host NAME` or `worker NAME`; empty for a namespace.
+    """
 
     namespace: str
     shapes: list[Shape] = field(default_factory=list)
     inner: dict[str, Region] = field(default_factory=dict)
+    place: str = ''
 
     @property
     def title(self) -> str:
-        """The namespace as it is shown."""
-        return escape(self.namespace)
+        """Its name as it is shown."""
+        return escape(self.place or self.namespace)
+
+    @property
+    def kind(self) -> str:
+        """Return `namespace`, `host` or `worker`."""
+        return self.place.partition(' ')[0] or 'namespace'
+
+    def at(self, place: Place) -> Region:
+        """Return the region of a host and a worker below this one; add it if it is missing."""
+        region = self
+        for noun, name in zip(('host', 'worker'), place, strict=True):
+            if name:
+                # No part of a namespace has a space.
+                key = f'{noun} {name}'
+                region = region.inner.setdefault(key, Region(self.namespace, place=key))
+        return region
 
     def within(self, namespace: str) -> Region:
         """Return the region of a namespace below this one; add it if it is missing."""
@@ -105,11 +126,11 @@ def arrange_shapes(picture: Picture) -> Arrangement:
     remarks = _Remarks(picture)
     tokens = tokens_of(picture)
     for node in picture.nodes:
-        root.within(node.namespace).shapes.append(_node_shape(tokens[node.id], node, remarks))
+        region = root.at(node.place).within(node.namespace)
+        region.shapes.append(_node_shape(tokens[node.id], node, remarks))
     for channel in picture.channels:
-        root.within(channel.namespace).shapes.append(
-            _channel_shape(tokens[channel.id], channel, remarks)
-        )
+        region = root.at(channel.place).within(channel.namespace)
+        region.shapes.append(_channel_shape(tokens[channel.id], channel, remarks))
     lines = [_edge_line(edge, tokens, remarks) for edge in picture.edges]
     for shape, line in _external_ends(picture.channels, tokens):
         root.shapes.append(shape)

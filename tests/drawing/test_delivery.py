@@ -134,3 +134,40 @@ def test_the_drawing_and_a_running_publisher_agree():
         spec = parse_entity_qos({'qos': each}, ())
         running = delivery_policies.why_sent(create_qos_profile(spec, {}))
         assert delivery.why_sent(resolve_qos(spec, {})) == running, each
+
+
+SPLIT = """
+    version: 1
+    nodes:
+      talker:
+        {talker}
+        publishers: {{words: std_msgs/msg/String}}
+        timers: {{t: {{rate: 1, publish: words, message: hello}}}}
+        services: {{add: {{type: std_srvs/srv/Trigger, behaviour: parts:add}}}}
+      near:
+        {talker}
+        subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: parts:hear}}}}
+      far:
+        {far}
+        subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: parts:hear}}}}
+        service_clients: {{add: std_srvs/srv/Trigger}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('talker', 'far', 'way'),
+    [
+        ('worker: a', 'worker: a', ('local', '')),
+        ('host: a', 'host: a', ('local', '')),
+        ('worker: a', 'worker: b', ('sent', 'other worker')),
+        ('worker: a', 'worker: ""', ('sent', 'other worker')),
+        ('host: a', 'host: b', ('sent', 'other host')),
+        ('{worker: a, host: a}', '{worker: b, host: b}', ('sent', 'other host')),
+    ],
+)
+def test_what_crosses_between_workers_and_hosts_is_sent(draw, talker, far, way):
+    lines = (each.strip('{}').replace(', ', '\n        ') for each in (talker, far))
+    found = ways(draw(SPLIT.format(talker=next(lines), far=next(lines))))
+    # The middleware cannot send to one subscription only.
+    assert set(found.values()) == {way}
+    assert len(found) == 5

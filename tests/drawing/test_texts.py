@@ -1,6 +1,7 @@
 """The forms that are languages of others: whatever a name holds, it stays text."""
 
 import html
+import json
 import re
 import xml.etree.ElementTree as ET
 
@@ -191,3 +192,67 @@ def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
     monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
     with pytest.raises(DrawingError, match='Graphviz failed with code 3: out of paper'):
         lay_out('digraph {}')
+
+
+PLACED = """
+    version: 1
+    workers: {eyes: {host: jetson}}
+    nodes:
+      camera:
+        worker: eyes
+        namespace: /robot
+        publishers: {image: std_msgs/msg/String}
+        timers: {t: {rate: 1, publish: image, message: hello}}
+      tracker:
+        worker: eyes
+        namespace: /robot
+        subscriptions: {image: {type: std_msgs/msg/String, publish: out}}
+        publishers: {out: std_msgs/msg/String}
+      plan:
+        host: jetson
+        subscriptions: {/robot/out: {type: std_msgs/msg/String, publish: cmd}}
+        publishers: {cmd: std_msgs/msg/String}
+      drive: {subscriptions: {cmd: {type: std_msgs/msg/String, publish: done}},
+              publishers: {done: {type: std_msgs/msg/String, external: true}}}
+    processes: {driver: {host: jetson, command: [sleep]}}
+"""
+
+
+def test_hosts_and_workers_are_drawn_around_what_they_have(draw):
+    text = render_picture(draw(PLACED), 'mermaid')
+    drawn = [line for line in text.splitlines() if line.startswith('  ') and '--' not in line]
+    shown = [line[2:].partition('["')[2].partition('"')[0] or line[2:] for line in drawn]
+    inside: list[str] = []
+    places = {}
+    for line, name in zip(drawn, shown, strict=True):
+        if 'subgraph' in line:
+            inside.append(name)
+        elif line.strip() == 'end':
+            inside.pop()
+        elif ':::' in line:
+            places[line.partition('"')[2].partition('"')[0].partition('<')[0]] = [*inside]
+    eyes = ['host jetson', 'worker eyes', '/robot']
+    assert places == {
+        'camera': eyes,
+        'tracker': eyes,
+        '/robot/image': eyes,
+        'plan': ['host jetson'],
+        '/robot/out': ['host jetson'],
+        'driver': ['host jetson'],
+        'drive': [],
+        '/cmd': [],
+        '/done': [],
+        'external': [],
+    }
+
+
+def test_hosts_and_workers_are_in_the_document(draw):
+    nodes = json.loads(render_picture(draw(PLACED), 'json'))['nodes']
+    places = {each['name']: (each['host'], each['worker']) for each in nodes}
+    assert places == {
+        'camera': ('jetson', 'eyes'),
+        'tracker': ('jetson', 'eyes'),
+        'plan': ('jetson', ''),
+        'drive': ('', ''),
+        'driver': ('jetson', ''),
+    }
