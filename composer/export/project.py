@@ -9,28 +9,27 @@ from typing import TYPE_CHECKING
 from composer.ament import ament_prefixes
 from composer.confidential import list_lineage
 from composer.errors import ComposerError
-from composer.stubs.project_modules import find_project_modules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from composer.checks.context import CheckContext
+    from composer.language.specs import SystemSpec
 
 _COMPOSER = Path(__file__).parents[1]
 # The root of the file system, and the folders right below it, belong to no project.
 _FEWEST_PARTS = 3
 
 
-def list_project_files(context: CheckContext, named: Iterable[Path]) -> list[Path]:
+def list_project_files(spec: SystemSpec, named: Iterable[Path]) -> list[Path]:
     """Return the files that a system needs, as absolute paths, but for those that are installed.
 
     What behaviours and processes open by themselves is not known.
 
     Args:
-        named: The files that the system is read from, and those that they name.
+        named: The files that the system is read from, those that they name, and the modules of
+            behaviours with what these import.
     """
-    modules = (each.source.path for each in find_project_modules(context).values())
-    candidates = [*named, *_of_processes(context), *filter(None, modules)]
+    candidates = [*named, *_of_processes(spec)]
     files = dict.fromkeys(Path(os.path.abspath(each)) for each in candidates)  # noqa: PTH100 - links stay
     # Composer itself is there already.
     prefixes = [_COMPOSER, *(each.absolute() for each in ament_prefixes())]
@@ -55,8 +54,8 @@ def find_root(files: Iterable[Path]) -> Path:
     return common
 
 
-def _of_processes(context: CheckContext) -> Iterator[Path]:
-    for process in context.spec.processes.values():
+def _of_processes(spec: SystemSpec) -> Iterator[Path]:
+    for process in spec.processes.values():
         folder = Path(process.cwd or '')
         words = [*process.command, *process.arguments, *filter(None, [process.launch])]
         for word in words:

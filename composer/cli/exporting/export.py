@@ -110,7 +110,7 @@ def _describe(  # noqa: PLR0913 - as above
 ) -> Export:
     spec, read = context.spec, choose_read(names)
     check_words(words, read)
-    files = list_project_files(context, [*paths, *list_files(context)])
+    files = list_project_files(spec, [*paths, *list_files(context)])
     stays_here, folder = form == _STAYS_HERE, Path.cwd()
     root = Path('/') if stays_here else find_root(files)
     return Export(
