@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import WorkerSpec
     from composer.yaml_text.positions import DataPath
 
 _RMW_INDEX = 'share/ament_index/resource_index/rmw_typesupport'
@@ -70,6 +71,8 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
         yield context.at_value(('environment', name), 'bad-environment', message, help=advice)
     for name in context.spec.environment:
         yield from _check_variable(context, ('environment', name))
+    for worker in context.spec.workers.values():
+        yield from _check_worker(context, worker)
     for process in context.spec.processes.values():
         for name in process.env:
             yield from _check_variable(context, (*process.path, 'env', name))
@@ -77,6 +80,20 @@ def check_environment(context: CheckContext) -> Iterator[Diagnostic]:
         for name, message, advice in _find_bad_values(process.env):
             path = (*process.path, 'env', name)
             yield context.at_value(path, 'bad-environment', message, help=advice)
+
+
+def _check_worker(context: CheckContext, worker: WorkerSpec) -> Iterator[Diagnostic]:
+    """Check the variables of a worker, in which the rest of the system must find its nodes."""
+    for name in worker.environment:
+        yield from _check_variable(context, (*worker.path, 'environment', name))
+    problems = [*_find_bad_values(worker.environment)]
+    domain = worker.environment.get('ROS_DOMAIN_ID')
+    if not problems and domain and domain != context.spec.environment.get('ROS_DOMAIN_ID'):
+        message = 'a worker in another ROS domain than the system sees nothing of it'
+        problems.append(('ROS_DOMAIN_ID', message, "set it for all, under 'environment:'"))
+    for name, message, advice in problems:
+        path = (*worker.path, 'environment', name)
+        yield context.at_value(path, 'bad-environment', message, help=advice)
 
 
 def _check_variable(context: CheckContext, path: DataPath) -> Iterator[Diagnostic]:

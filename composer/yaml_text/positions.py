@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.diagnostics import SourceFile, Span
 from composer.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 Key: TypeAlias = str | int
 DataPath: TypeAlias = tuple[Key, ...]
@@ -18,6 +21,14 @@ class Branch:
 
     keys: tuple[tuple[DataPath, Span], ...]
     values: tuple[tuple[DataPath, Span], ...]
+
+    def only(self, keys: Collection[Key]) -> Branch:
+        """Return the positions of some of the entry's own keys, and of all below these."""
+        parts = (
+            tuple(each for each in spans if each[0] and each[0][0] in keys)
+            for spans in (self.keys, self.values)
+        )
+        return Branch(*parts)
 
     def inner(self, section: Key) -> dict[Key, Branch]:
         """Return the positions of the entries of a mapping in this entry, by their keys."""

@@ -113,6 +113,27 @@ def test_an_include_in_an_include_hands_on_where_its_nodes_run(load):
     assert spec.processes['driver'].host == 'x'
 
 
+def test_what_files_say_of_one_worker_is_merged_key_by_key(load):
+    spec = load(
+        robot="""
+            version: 1
+            include: {left: {file: arm.yaml}, right: {file: arm.yaml, namespace: right}}
+            workers: {arms: {cpus: [1], environment: {A: 1}}}
+        """,
+        arm="""
+            version: 1
+            workers: {arms: {cpus: [0], nice: 5}}
+            nodes: {arm: {worker: arms}}
+        """,
+    )
+    arms = spec.workers['arms']
+    assert (arms.cpus, arms.nice, dict(arms.environment)) == ((1,), 5, {'A': '1'})
+    system = load_system(Path('robot.yaml'))
+    places = system.positions.values
+    assert places['workers', 'arms', 'cpus'].source.name == 'robot.yaml'
+    assert places['workers', 'arms', 'nice'].source.name == 'arm.yaml'
+
+
 def test_processes_and_containers_run_on_the_host_of_the_defaults(load):
     spec = load(
         robot="""

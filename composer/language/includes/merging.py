@@ -222,7 +222,7 @@ class IncludeMerger:
     def _add_declared(self, section: str, part: LoadedSystem) -> None:
         """Add what a file declares in a section whose names hold everywhere.
 
-        What the file around it declares under such a name stays.
+        What the file around it says under such a name stays; the rest is added key by key.
         """
         for name in part.entries.get(section, {}):
             declared = self._whole.entries.setdefault(section, {})
@@ -230,10 +230,14 @@ class IncludeMerger:
             is_left_out = path in part.left_out
             if not (name in declared and is_left_out):
                 self._leave_out(path, is_left_out=is_left_out)
+            entry, branch = part.entries[section][name], part.branches(section)[name]
             if name not in declared:
-                declared[name] = part.entries[section][name]
-                branch = part.branches(section)[name]
+                declared[name] = entry
                 self._whole.positions.graft(path, branch)
+            elif isinstance(entry, dict) and not is_left_out:
+                added = entry.keys() - declared[name].keys()
+                declared[name] = {**entry, **declared[name]}
+                self._whole.positions.graft(path, branch.only(added))
 
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:

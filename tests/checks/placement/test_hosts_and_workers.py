@@ -45,6 +45,32 @@ CASES = [
     ),
     ('defaults: {host: y}\nworkers: {w: {host: x}}\nnodes: {a: {worker: w}, b: {}}', []),
     ('include: {arm: {file: arm.yaml, host: y, worker: w}}\nworkers: {w: {host: x}}', []),
+    # Each host has its own processes.
+    ('defaults: {host: x}\nnodes: {a: {wait_for: {process: p}}}\nprocesses: {p: {command: [sleep]}}', []),
+    (
+        'nodes: {a: {host: x, wait_for: {process: p}}}\nprocesses: {p: {command: [sleep], host: y}}',
+        [('2:42', 'process-elsewhere', 'wait for a node, topic, service or action of it')],
+    ),
+    (
+        'nodes: {}\nprocesses: {p: {command: [sleep], host: y}, q: {command: [sleep], host: x, on_exit: {start: p}}}',
+        [('3:93', 'process-elsewhere', 'let both run on one host')],
+    ),
+    (
+        'nodes: {}\nprocesses: {p: {command: [sleep], host: y}, q: {command: [sleep], host: x, wait_for: {process: p}}}',
+        [('3:96', 'process-elsewhere', 'wait for a node, topic, service or action of it')],
+    ),
+    ('nodes: {a: {wait_for: {process: p}}}\nprocesses: {p: {command: [sleep], host: y}}', []),
+    # The nodes of a worker find the others.
+    (
+        'workers: {w: {environment: {ROS_DOMAIN_ID: 7}}}\nnodes: {a: {worker: w}}',
+        [('2:44', 'bad-environment', "set it for all, under 'environment:'")],
+    ),
+    ('environment: {ROS_DOMAIN_ID: 7}\nworkers: {w: {environment: {ROS_DOMAIN_ID: 7}}}\nnodes: {a: {worker: w}}', []),
+    ('workers: {w: {environment: {ROS_DOMAIN_ID: x}}}\nnodes: {a: {worker: w}}', [('2:44', 'bad-environment', None)]),
+    (
+        'workers: {w: {environment: {ROS_DOMIAN_ID: 7}}}\nnodes: {a: {worker: w}}',
+        [('2:29', 'likely-misspelling', "did you mean 'ROS_DOMAIN_ID'?")],
+    ),
     # A worker is there for nodes.
     ('workers: {w: {}}\nnodes: {a: {}}', [('2:11', 'unused-worker', 'remove it, or name it in a node')]),
     ('workers: {vision: {}}\nnodes: {a: {worker: vison}}', [('2:11', 'unused-worker', "did you mean 'vison'?")]),
