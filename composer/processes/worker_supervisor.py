@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -74,7 +75,8 @@ class WorkerSupervisor(ProcessSupervisor):
 
     def _after_end(self, run: ProcessRun, code: int) -> None:
         is_expected = run.process.is_leaving or self._stopping.is_set()
-        if is_expected and code == ExitCode.DONE:
+        # SIGTERM hurries those that have stopped already.
+        if is_expected and code in (ExitCode.DONE, -signal.SIGTERM):
             return
         if not is_expected:
             self.on_end(run.process)

@@ -246,6 +246,8 @@ class System:
                     self.open()
                 with together('start_waiting'):
                     self.start_waiting()
+            if not self.stop_requested:
+                self.workers.keep_up()
         except BaseException:
             self.stop()
             raise
@@ -254,8 +256,8 @@ class System:
         # Who reads the line may stop the system at once.
         self._stop_request.system_is_up = True
         self._tell_start()
-        with together('be_up'):
-            self.be_up()
+        self.workers.be_up()
+        self.be_up()
 
     def create(self) -> None:
         """Create all nodes and entities of this process; no behaviour is called yet.

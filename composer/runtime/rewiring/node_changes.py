@@ -103,7 +103,7 @@ class NodeChange:
         spec = getattr(self._after, section).get(name)
         if operation.action is Action.CHANGE and before is not None:
             old = getattr(self._before, section)[name]
-            transaction.on_undo(node.change, operation.noun, old, before)
+            transaction.on_undo(self._change_back, operation.noun, old, before)
             node.change(operation.noun, spec, before)
             return
         if operation.action in COMING:
@@ -120,6 +120,11 @@ class NodeChange:
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             transaction.on_commit(node.forget, operation.noun, name)
+
+    def _change_back(self, noun: str, spec: Any, entity: LiveEntity) -> None:
+        # Its behaviours are bound now, and the record of the node comes back later.
+        self._node.functions = self._old.functions
+        self._node.change(noun, spec, entity)
 
     def _create(self, target: Target, spec: Any) -> LiveEntity:
         """Create an entity; one whose topic gets another type when the old ends have gone."""
@@ -152,7 +157,7 @@ class NodeChange:
             for name, client_spec in spec.action_clients.items():
                 client = node.entities['action_clients'][name]
                 old = before.action_clients.get(name, client_spec)
-                transaction.on_undo(node.change, 'action client', old, client)
+                transaction.on_undo(self._change_back, 'action client', old, client)
                 node.change('action client', client_spec, client)
 
 

@@ -91,14 +91,9 @@ class Worker:
         """
         arguments = (self.assignment,) if step == 'create' else ()
         try:
-            result = self.call(step, *arguments)
+            return self.call(step, *arguments)
         except ChannelLostError as error:
-            message = f"worker '{self.name}' {self._describe_end()}"
-            raise StartError(message) from error
-        if step == 'be_up':
-            self.is_up = True
-            self.keep_to_rules()
-        return result
+            raise StartError(self.describe_failed_start()) from error
 
     def start(self) -> None:
         """Do all steps of its start, beside a system that is up.
@@ -108,6 +103,8 @@ class Worker:
         """
         for step in _STEPS:
             self.do(step)
+        self.is_up = True
+        self.keep_to_rules()
 
     def begin_again(self) -> None:
         """Run its nodes in a process that was started anew.
@@ -166,13 +163,14 @@ class Worker:
             'nodes': self.nodes,
         }
 
-    def _describe_end(self) -> str:
+    def describe_failed_start(self) -> str:
+        """Return in words that its process has ended while it started."""
         run = self.process.run
         if run is not None:
             run.ended.wait(_END_SEC)
         if run is None or run.code is None:
-            return 'does not answer'
-        return f'{describe_end(run.code)} while it started'
+            return f"worker '{self.name}' does not answer"
+        return f"worker '{self.name}' {describe_end(run.code)} while it started"
 
 
 def drop_imports(worker: Worker) -> None:

@@ -46,7 +46,8 @@ def main(name: str) -> None:
     """Run the worker of this name until the process of the system ends it."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(line_buffering=True, errors='backslashreplace')
+            # Whole lines, also if Python was told not to buffer: others write there, too.
+            stream.reconfigure(line_buffering=True, write_through=False, errors='backslashreplace')
     faulthandler.enable()
     worker = WorkerProcess(name)
     # What a user or the kernel sends to this process alone: its nodes stop, and that is a failure.

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.bindings import system_bindings
 from composer.processes.worker_supervisor import WorkerSupervisor
 from composer.runtime.workers.assignment import Assignment, ImportRequest
@@ -41,6 +41,7 @@ _ANSWER_SEC = 1.0
 # How much longer than its behaviours a worker may take to stop.
 _MARGIN_SEC = 1.0
 _KILL_SEC = 0.5
+_EXIT_SEC = 5.0
 
 
 class _LazyLogger:
@@ -251,6 +252,25 @@ class Workers:
         yield results
         results += [result for _, result in outcomes]
 
+    def keep_up(self) -> None:
+        """Keep all workers up from now on, as the file says.
+
+        Raises:
+            StartError: One has ended already.
+        """
+        for worker in self._workers.values():
+            worker.is_up = True
+            worker.keep_to_rules()
+        for worker in self._workers.values():
+            if not worker.is_alive:
+                raise StartError(worker.describe_failed_start())
+
+    def be_up(self) -> None:
+        """Tell all workers that the system has started."""
+        for worker in self._workers.values():
+            with suppress(ComposerError):
+                worker.channel.tell('be_up')
+
     def _each(
         self, workers: Sequence[Worker], do: Callable[[Worker], Any]
     ) -> Iterator[tuple[Worker, Any]]:
@@ -438,12 +458,12 @@ class Workers:
             The exit code, and whether all behaviours have ended.
         """
         results = [self._stops.get() for _ in range(self._stopping)]
-        self._supervisor.timeout_sec = _KILL_SEC
+        have_stopped = all(ended for _, ended in results)
+        # What has stopped is on its way out.
+        self._supervisor.timeout_sec = _EXIT_SEC if have_stopped else _KILL_SEC
         has_killed = not self._supervisor.stop()
         codes = [code for code, _ in results if code]
-        return codes[0] if codes else ExitCode.DONE, not has_killed and all(
-            ended for _, ended in results
-        )
+        return codes[0] if codes else ExitCode.DONE, have_stopped and not has_killed
 
     def kill_all(self) -> None:
         """Kill all at once; a signal handler may call it."""

@@ -1,0 +1,122 @@
+"""An edit moves nodes between workers, and brings, changes and ends workers."""
+
+import json
+import os
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from tests.runtime.workers.observed import (
+    CODE,
+    HEARS,
+    TALKS,
+    is_there,
+    node,
+    pid_of,
+    system,
+    wait_until_gone,
+)
+
+pytestmark = pytest.mark.ros
+
+
+def edit(compose, child, text, code=CODE, *, fails=False):
+    """Write new files, and wait until the system has taken them, or refused to."""
+    sign = 'not reloaded: ' if fails else ': reloaded in'
+    done = len(child.matching(sign))
+    compose.write(text, code)
+    child.wait_for_line(sign, times=1 + done)
+
+
+def test_nodes_move_between_workers_and_the_rest_stays(compose):
+    def text(talker, far, more=''):
+        nodes = {
+            'talker': node(talker, *TALKS),
+            'far': node(far, *HEARS),
+            'home': node('', *HEARS),
+        }
+        return system(nodes, more)
+
+    child = compose(text('left', 'right'), CODE, '--watch')
+    child.wait_until_ready()
+    left, right = pid_of(child, 'talker'), pid_of(child, 'far')
+
+    # They exchange their places: two nodes of a name would disturb each other.
+    edit(compose, child, text('right', 'left'))
+    assert pid_of(child, 'talker', times=2) == right
+    assert pid_of(child, 'far', times=2) == left
+    child.wait_for_line(f'far hears 1 of {right} in {left}')
+
+    # A worker that loses its last node goes; one that is named comes.
+    edit(compose, child, text('', 'new'))
+    assert pid_of(child, 'talker', times=3) == child.pid
+    new = pid_of(child, 'far', times=3)
+    wait_until_gone([left, right])
+
+    # What a process takes only when it starts needs another one.
+    limits = 'workers: {new: {environment: {SENSOR: front}, restart: {when: never}}}\n'
+    edit(compose, child, text('', 'new', limits))
+    newest = pid_of(child, 'far', times=4)
+    assert newest != new
+    wait_until_gone([new])
+    edit(
+        compose,
+        child,
+        text('', 'new', limits.replace('}, restart', '}, cpus: [1], threads: 2, restart')),
+    )
+    assert os.sched_getaffinity(newest) == {1}
+    assert len(child.matching('home begins')) == 1
+    assert child.stop() == 0
+
+
+def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose):
+    nodes = {'talker': node('left', *TALKS), 'far': node('right', *HEARS)}
+    child = compose(system(nodes), CODE, '--watch')
+    child.wait_until_ready()
+    pids = [pid_of(child, name) for name in nodes]
+
+    edit(compose, child, system(nodes), CODE.replace(' hears ', ' reads '))
+    child.wait_for_line('far reads')
+    assert all(map(is_there, pids))
+
+    # The new node cannot start, so the other one stays where it is.
+    bad = {
+        'talker': node('right', *TALKS),
+        'far': nodes['far'],
+        'bad': '{worker: third, on_start: {behaviour: parts:fail}}',
+    }
+    edit(compose, child, system(bad), CODE.replace(' hears ', ' gets '), fails=True)
+    assert pid_of(child, 'talker', times=len(child.matching('talker begins'))) == pids[0]
+    seen = len(child.matching('far reads'))
+    child.wait_for_line('far reads', times=seen + 5)
+    assert not child.matching('far gets')
+    assert child.stop() == 0
+
+
+def test_a_running_system_tells_of_its_workers(compose, capsys, monkeypatch):
+    from composer.cli.main import run
+
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(compose.domain_id))
+    child = compose(system({'talker': node('left', *TALKS), 'home': node('', *HEARS)}), CODE)
+    child.wait_until_ready()
+    assert run(['ps', '--format', 'json']) == 0
+    (found,) = json.loads(capsys.readouterr()[0])['systems']
+    assert found['nodes'] == ['/home', '/talker']
+    (worker,) = found['workers']
+    assert worker == {
+        'name': 'left',
+        'state': 'running',
+        'pid': pid_of(child, 'talker'),
+        'restarts': 0,
+        'nodes': ['/talker'],
+    }
+    assert run(['top', '--once', '--format', 'json']) == 0
+    entities = json.loads(capsys.readouterr()[0])['entities']
+    assert {(each['node'], each['worker']) for each in entities} == {
+        ('/talker', 'left'),
+        ('/home', ''),
+    }
+    assert run(['restart', '/talker']) == 0
+    assert pid_of(child, 'talker', times=2) == worker['pid']
+    assert child.stop() == 0

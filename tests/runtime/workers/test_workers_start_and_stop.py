@@ -1,0 +1,168 @@
+"""Nodes in workers start and stop with their system, as nodes of its own process do."""
+
+import signal
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from tests.runtime.workers.observed import (
+    CODE,
+    HEARS,
+    TALKS,
+    node,
+    pid_of,
+    system,
+    wait_until_gone,
+)
+
+pytestmark = pytest.mark.ros
+
+
+def test_each_worker_is_a_process_and_what_crosses_arrives(compose):
+    child = compose(
+        system(
+            {
+                'talker': node('left', *TALKS),
+                'near': node('left', *HEARS),
+                'far': node('right', *HEARS),
+                'home': node('', *HEARS),
+            }
+        ),
+        CODE,
+    )
+    child.wait_until_ready()
+    pids = {name: pid_of(child, name) for name in ('talker', 'near', 'far', 'home')}
+    assert pids['talker'] == pids['near']
+    assert len({*pids.values()}) == 3
+    assert pids['home'] == child.pid
+    for name in ('near', 'far', 'home'):
+        line = child.wait_for_line(f'{name} hears')
+        assert line.endswith(f'of {pids["talker"]} in {pids[name]}')
+    assert child.stop() == 0
+    ends = [line for line in child.lines if ' ends in ' in line]
+    assert sorted(ends) == sorted(f'{name} ends in {pid}' for name, pid in pids.items())
+    wait_until_gone(pids.values())
+
+
+def test_no_on_start_runs_before_all_nodes_of_all_workers_exist(compose):
+    child = compose(
+        system(
+            {
+                'talker': node('left', *TALKS),
+                'late': node('right', *HEARS),
+            },
+            'workers: {right: {cpus: [1023]}}\n',
+        ),
+        CODE,
+    )
+    assert child.wait() == 1
+    assert 'begins' not in child.output
+    assert child.matching("error: worker 'right' cannot have cpus [1023]")
+
+
+@pytest.mark.parametrize(
+    ('behaviour', 'code', 'message'),
+    [
+        ('fail', 1, "error: node 'bad': on_start raised ValueError('no camera')"),
+        ('wait', 1, None),
+    ],
+)
+def test_an_on_start_in_a_worker_that_does_not_end_well_ends_the_start(
+    compose, behaviour, code, message
+):
+    child = compose(
+        system(
+            {
+                'home': node('', *TALKS),
+                'good': node('left', *HEARS),
+                'bad': '{worker: right, on_start: {behaviour: parts:' + behaviour + '}}',
+            }
+        ),
+        CODE,
+    )
+    if message is None:
+        child.wait_for_line('bad waits')
+        good = pid_of(child, 'good')
+        assert child.stop() == code
+    else:
+        assert child.wait() == code
+        assert child.lines[-1] == message
+        good = pid_of(child, 'good')
+    assert not child.matching(' ready in ')
+    assert child.matching('good ends in')
+    assert child.matching('home ends in')
+    wait_until_gone([good])
+
+
+def test_errors_in_modules_of_a_worker_are_findings_before_anything_starts(compose):
+    text = system({'home': node('', *TALKS), 'bad': '{worker: right, on_start: late:begin}'})
+    (compose.folder / 'late.py').write_text(
+        'import parts\ndef begin(node): pass\n1 / len(parts.__name__[9:])\n'
+    )
+    child = compose(text, CODE)
+    assert child.wait() == 1
+    assert "importing 'late' raised ZeroDivisionError" in child.output
+    assert 'error[broken-behaviour]' in child.output
+    assert 'begins' not in child.output
+
+
+def test_what_waits_is_started_across_workers(compose):
+    serves = node(
+        'left', 'services: {add: {type: std_srvs/srv/Empty, service: add, behaviour: parts:serve}}'
+    )
+    waiting = node('right', 'wait_for: {service: add}', *HEARS)
+    last = node('', 'wait_for: {node: second}', *TALKS)
+    child = compose(
+        system(
+            {'third': last, 'second': waiting, 'first': serves},
+            'processes: {program: {command: [sleep, 60]}}\n',
+        ),
+        CODE,
+    )
+    child.wait_until_ready()
+    begun = [line.split()[0] for line in child.lines if ' begins in ' in line]
+    assert begun == ['first', 'second', 'third']
+    child.wait_for_line('second hears')
+    assert child.stop() == 0
+
+
+def test_a_worker_waits_for_external_processes(compose):
+    child = compose(
+        system(
+            {'eager': node('left'), 'patient': node('right', 'wait_for: {process: setup}')},
+            'processes: {setup: {command: [sh, -c, "sleep 0.5; echo has set up"]}}\n',
+        ),
+        CODE,
+    )
+    child.wait_until_ready()
+    order = [line.split()[0] for line in child.lines if 'begins' in line or 'has set up' in line]
+    assert order[0] == 'eager'
+    assert child.stop() == 0
+
+
+def test_a_node_of_a_worker_ends_the_system_with_its_exit_code(compose):
+    timer = 'timers: {t: {period: 0.1, behaviour: parts:end_system}}'
+    child = compose(system({'home': node('', *HEARS), 'last': node('right', timer)}), CODE)
+    assert child.wait() == 3
+    assert child.matching('home ends in')
+    assert child.matching('last ends in')
+
+
+def test_a_worker_has_its_environment_its_cores_and_its_niceness(compose):
+    code = """
+        import os
+
+        def tell(node):
+            print('has', os.environ['SENSOR'], os.sched_getaffinity(0), os.nice(0), flush=True)
+    """
+    timer = 'timers: {t: {period: 0.2, behaviour: parts:tell}}'
+    child = compose(
+        system(
+            {'one': '{worker: left, ' + timer + '}'},
+            'workers: {left: {environment: {SENSOR: front}, cpus: [1], nice: 3, threads: 1}}\n',
+        ),
+        code,
+    )
+    assert child.wait_for_line('has') == 'has front {1} 3'
+    assert child.stop(signal.SIGTERM) == 0
