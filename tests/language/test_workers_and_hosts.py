@@ -1,11 +1,16 @@
 """Where nodes and processes run: workers, hosts and the network as files say it."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from composer.language.pipeline import load_system
+from composer.cli.main import run
+from composer.language.pipeline import load_system, load_system_text
 
 INVENTORY = """
     hosts:
@@ -101,6 +106,58 @@ def test_a_node_runs_where_it_or_what_is_around_it_says(load, robot, arm, expect
     spec = load(robot=f'version: 1\n{robot}\n', arm=f'version: 1\n{arm}\nnodes: {{inner: {{}}}}\n')
     assert places(spec) == expected
     assert set(spec.workers) == {worker for worker, _ in expected.values() if worker}
+
+
+@pytest.mark.parametrize(('robot', 'arm', 'expected'), PLACES)
+def test_the_system_that_show_prints_runs_in_the_same_places(load, capsys, robot, arm, expected):
+    texts = (f'version: 1\n{robot}\n', f'version: 1\n{arm}\nnodes: {{inner: {{}}}}\n')
+    before = load(robot=texts[0], arm=texts[1])
+    assert run(['show', 'robot.yaml']) == 0
+    after = load(robot=capsys.readouterr().out)
+    assert places(after) == places(before) == expected
+    plain = [
+        {name: replace(each, path=()) for name, each in spec.workers.items()}
+        for spec in (before, after)
+    ]
+    assert plain[0] == plain[1]
+
+
+def test_paths_and_values_of_an_inventory_hold_in_what_show_prints(load, capsys, tmp_path):
+    load(robot='version: 1\nnodes: {here: {host: jetson}}\n', inventory=INVENTORY)
+    assert run(['show', 'robot.yaml', 'inventory.yaml']) == 0
+    printed = capsys.readouterr().out
+    (tmp_path / 'elsewhere').mkdir()
+    spec = load(robot=printed)
+    assert spec.hosts['jetson'].identity_file == str(tmp_path / 'keys/robot')
+    assert spec.network.peers == ('10.0.0.9',)
+
+
+NAMES = st.sampled_from(['', 'a', 'b'])
+ENTRIES = st.fixed_dictionaries({}, optional={'worker': NAMES, 'host': NAMES})
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    nodes=st.dictionaries(st.sampled_from('wxyz'), ENTRIES, min_size=1),
+    workers=st.dictionaries(
+        st.sampled_from('ab'), st.fixed_dictionaries({}, optional={'host': NAMES})
+    ),
+    defaults=ENTRIES,
+)
+def test_each_node_is_in_one_part(nodes, workers, defaults):
+    data = {'version': 1, 'nodes': nodes, 'workers': workers, 'defaults': defaults}
+    spec = load_system_text(json.dumps(data)).spec
+    hosts, names = {each.host for each in spec.nodes.values()}, {'', *spec.workers}
+    by_host = [name for host in hosts for name in spec.on_host(host).nodes]
+    by_worker = [name for worker in names for name in spec.in_worker(worker).nodes]
+    assert sorted(by_host) == sorted(by_worker) == sorted(nodes)
+    for key, node in spec.nodes.items():
+        # What a node says itself holds.
+        assert node.worker == nodes[key].get('worker', defaults.get('worker', ''))
+        if nodes[key].get('host'):
+            assert node.host == nodes[key]['host']
+        elif node.worker:
+            assert node.host in (spec.workers[node.worker].host, defaults.get('host', ''))
 
 
 def test_an_include_in_an_include_hands_on_where_its_nodes_run(load):
