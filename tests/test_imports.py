@@ -42,6 +42,7 @@ ROOMS = (
         'launch_files',
     ),
     *('virtual_time', 'recordings', 'simulation', 'scenarios'),
+    'suggestions',
     'stubs',
     'export',
     *('cli', 'pytest_plugin', 'api', '__init__', '__main__'),

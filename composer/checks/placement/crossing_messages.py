@@ -57,7 +57,7 @@ def _check_size(context: CheckContext, crossing: Crossing) -> Iterator[Diagnosti
         subscription = None if publisher.is_declared else next(elsewhere, None)
         if subscription is None:
             continue
-        if not _is_big(context, publisher.entity.type):
+        if not is_big(context, publisher.entity.type):
             continue
         where = _tell(publisher), _tell(subscription)
         yield context.at_key(
@@ -94,7 +94,7 @@ def _tell(end: Endpoint) -> str:
     return describe_place(place_of(end)) or 'the process of the system'
 
 
-def _is_big(context: CheckContext, type_name: str, depth: int = 0) -> bool:
+def is_big(context: CheckContext, type_name: str, depth: int = 0) -> bool:
     """Return whether messages of a type are big by their definition, or by what they are for."""
     if type_name in _BIG:
         return True
@@ -102,7 +102,7 @@ def _is_big(context: CheckContext, type_name: str, depth: int = 0) -> bool:
     if not isinstance(description, MessageDescription) or depth > _DEEPEST:
         return False
     return any(
-        _is_big(context, field.type.nested, depth + 1)
+        is_big(context, field.type.nested, depth + 1)
         if field.type.nested
         else _SIZES.get(field.type.kind, 0) * _count_items(field.type) >= _BIG_BYTES
         for field in description.fields

@@ -32,6 +32,7 @@ TOP: Final[Form] = {
         {
             'worker': str,
             'pid': int,
+            'cores': int,
             **dict.fromkeys(('cpu', 'gil', 'gil_wait_mean_ms', 'gil_wait_max_ms'), _FIGURE),
         }
     ],

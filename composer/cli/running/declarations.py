@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, split_words, takes_system
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
 
 _LONGEST_SEC = 60.0
@@ -171,10 +172,73 @@ def capture_command(
     return capture(nodes, format_name=format_name, output=output, timeout_sec=timeout_sec)
 
 
+@click.command('suggest', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
+@click.option(
+    '--recording',
+    type=click.Path(path_type=Path),
+    metavar='RECORDING',
+    help='A recording with /diagnostics, as an MCAP file or a folder of rosbag2. '
+    'Default: the running system of this name.',
+)
+@click.option(
+    '--seconds',
+    type=click.FloatRange(min=0),
+    default=10.0,
+    show_default=True,
+    metavar='SEC',
+    help='How long to watch the running system.',
+)
+@click.option(
+    '--cores',
+    type=click.IntRange(min=1),
+    metavar='N',
+    help='How many processor cores there are. Default: those of where it was measured.',
+)
+@click.option('--host', default='', metavar='NAME', help='The host whose part is meant.')
+@click.option(
+    '-o',
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar='LAYER',
+    help='Write the layer file for it.',
+)
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(['text', 'json']),
+    default='text',
+    show_default=True,
+    help='The output format.',
+)
+def suggest_command(  # noqa: PLR0913 - one for each option
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
+    *,
+    recording: Path | None,
+    seconds: float,
+    cores: int | None,
+    host: str,
+    output: Path | None,
+    format_name: str,
+) -> int:
+    """Suggest which nodes of FILE should run in workers.
+
+    With the gain to expect, from what its callbacks cost while it ran: the running system of that name is watched, or a
+    recording of /diagnostics is read. The result is a layer, as in 'composer up FILE split.yaml'.
+    """
+    from composer.cli.running.suggest import SuggestOptions, suggest
+
+    paths, values = split_words(words)
+    options = SuggestOptions(recording, seconds, cores, host, output, format_name)
+    return suggest(paths, values, set_values, options)
+
+
 COMMANDS = (
     capture_command,
     ps_command,
     top_command,
+    suggest_command,
     logs_command,
     reload_command,
     restart_command,

@@ -186,6 +186,7 @@ def _describe_process(costs: ProcessCosts) -> dict[str, Any]:
     waits = costs.waits
     return {
         'pid': os.getpid(),
+        'cores': costs.cores,
         'cpu': costs.cpu,
         'gil': costs.held,
         'gil_wait_mean_ms': None if waits is None else waits.mean_ms,

@@ -192,6 +192,7 @@ class ControlNode:
                 self._health,
                 self._calls,
                 self._system.find_deliveries,
+                self._worker,
             )
             try:
                 diagnostics.start(self._node)

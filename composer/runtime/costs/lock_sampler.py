@@ -8,8 +8,10 @@ is killed, when the process has ended, and when it may not read. What it finds i
 64-bit numbers that both share, see below.
 """
 
+import contextlib
 import ctypes
 import mmap
+import resource
 import struct
 import sys
 import time
@@ -23,8 +25,13 @@ TABLE_SIZE = 8 * (FIRST + 2 * MOST_THREADS)
 # `last_holder` and `locked` of `struct _gil_runtime_state`.
 HOLDER = struct.Struct('=Qi')
 
+RLIMIT_LOCKS = 10
 # A sample costs up to 0.1 ms of a processor. Pauses differ, so they keep no step with timers.
 _SHORTEST_SEC, _LONGEST_SEC = 0.006, 0.018
+# Where processors are scarce, a sample is late, and comes when a thread has just let go of one,
+# and so mostly of the interpreter, too: it says nothing about the time before.
+_LATE_NS = 1_000_000
+_NS_PER_SEC = 1e9
 _GOLDEN = 0.6180339887498949
 
 
@@ -67,12 +74,14 @@ def main(pid: int, descriptor: int, holder_address: int, thread_offset: int) -> 
     table = memoryview(mmap.mmap(descriptor, TABLE_SIZE)).cast('Q')
     holder, thread = Memory(pid, HOLDER.size), Memory(pid, 8)
     places: dict[int, int] = {}
-    phase, before_ns = 0.0, time.monotonic_ns()
+    phase, before_ns, due_ns = 0.0, time.monotonic_ns(), 0
     while data := holder.read(holder_address):
         now_ns = time.monotonic_ns()
         passed_ns, before_ns = now_ns - before_ns, now_ns
+        if now_ns > due_ns + _LATE_NS:
+            passed_ns = 0
         state, is_locked = HOLDER.unpack(data)
-        if is_locked:
+        if is_locked and passed_ns:
             table[HELD] += passed_ns
             # The thread may have ended meanwhile.
             if ident := int.from_bytes(thread.read(state + thread_offset), sys.byteorder):
@@ -81,7 +90,16 @@ def main(pid: int, descriptor: int, holder_address: int, thread_offset: int) -> 
         table[ELAPSED] += passed_ns
         table[SAMPLES] += 1
         phase = (phase + _GOLDEN) % 1.0
-        time.sleep(_SHORTEST_SEC + phase * (_LONGEST_SEC - _SHORTEST_SEC))
+        pause_sec = _SHORTEST_SEC + phase * (_LONGEST_SEC - _SHORTEST_SEC)
+        due_ns = now_ns + int(pause_sec * _NS_PER_SEC)
+        time.sleep(pause_sec)
+
+
+def leave_to_itself() -> None:
+    """Take off the mark of what behaviours have started (`composer.processes.guardian`)."""
+    with contextlib.suppress(OSError, ValueError):
+        _, hard = resource.getrlimit(RLIMIT_LOCKS)
+        resource.setrlimit(RLIMIT_LOCKS, (hard, hard))
 
 
 def add_thread(table: 'memoryview[int]', places: dict[int, int], ident: int) -> int:
@@ -94,4 +112,5 @@ def add_thread(table: 'memoryview[int]', places: dict[int, int], ident: int) -> 
 
 
 if __name__ == '__main__':
+    leave_to_itself()
     main(*map(int, sys.argv[1:]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import TYPE_CHECKING
 
@@ -19,12 +20,14 @@ class ProcessCosts:
     """The costs of one period.
 
     Attributes:
+        cores: How many processor cores it may use.
         cpu: How many processors the process used on average, with all of its threads.
         sampled_ns: How long it was sampled who holds the interpreter; 0 if that cannot be known.
         held: The share of that time in which somebody held it; `None` if that cannot be known.
         waits: How long others waited for it; `None` if that was not measured.
     """
 
+    cores: int
     cpu: float
     sampled_ns: int
     held: float | None
@@ -55,6 +58,7 @@ class ProcessMeter:
         held_ns = all_sampled.held_ns - self._held_ns
         self._sampled_ns, self._held_ns = all_sampled.elapsed_ns, all_sampled.held_ns
         return ProcessCosts(
+            cores=len(os.sched_getaffinity(0)),
             cpu=(self._cpu_ns - before_ns) / _NS_PER_SEC / period_sec,
             sampled_ns=sampled_ns,
             held=min(1.0, held_ns / sampled_ns) if sampled_ns else None,

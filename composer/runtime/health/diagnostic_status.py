@@ -29,13 +29,16 @@ class StatusWriter:
         node: The full name of its node.
         owner: The entity.
         system: The system's name.
+        worker: The worker that it runs in; empty for the process of the system.
     """
 
-    def __init__(self, node: str, owner: Owner, system: str) -> None:
+    def __init__(self, node: str, owner: Owner, system: str, worker: str = '') -> None:
         kind = KIND_OF_NOUN.get(owner.kind)
         self._missed = kind.missed if kind else {}
         self._values: dict[str, KeyValue] = {}
         self._status = DiagnosticStatus(name=_name(node, owner), hardware_id=system)
+        if worker:
+            self._set('worker', worker)
 
     def write(self, report: EntityReport) -> DiagnosticStatus:
         """Return the status; the message is the same one each time."""
@@ -155,6 +158,7 @@ def system_status(
 def _describe_costs(costs: ProcessCosts) -> dict[str, str]:
     waits = costs.waits
     return {
+        'cores': str(costs.cores),
         'cpu (%)': format_percent(costs.cpu),
         'GIL (%)': format_percent(costs.held),
         'GIL wait mean (ms)': '' if waits is None else f'{waits.mean_ms:.3f}',

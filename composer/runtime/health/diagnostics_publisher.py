@@ -62,6 +62,7 @@ class DiagnosticsPublisher:
         state: The state of the system itself.
         period_sec: Seconds between two messages.
         find_deliveries: Returns which way publishers and clients deliver.
+        worker: The worker whose process this is; empty for that of the system.
 
     Attributes:
         latest: The health in the last period.
@@ -74,7 +75,9 @@ class DiagnosticsPublisher:
         registry: HealthRegistry,
         calls: CallWatcher,
         find_deliveries: Callable[[], Deliveries],
+        worker: str = '',
     ) -> None:
+        self._worker = worker
         self._find_deliveries = find_deliveries
         self.latest = Reports(0, None, {})
         self.period_sec = period_sec
@@ -148,7 +151,7 @@ class DiagnosticsPublisher:
             statuses = [system_status(name, self._state, latest.costs)]
             for key, report in latest.by_entity.items():
                 if key not in writers:
-                    writers[key] = StatusWriter(*key, self._state.name)
+                    writers[key] = StatusWriter(*key, self._state.name, self._worker)
                 statuses.append(writers[key].write(report))
             statuses += [
                 delivery_status(*key, each, self._state.name)

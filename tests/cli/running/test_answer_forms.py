@@ -46,6 +46,7 @@ ENTITY = {
 PROCESS = {
     'worker': '',
     'pid': 1,
+    'cores': 2,
     'cpu': 0.5,
     'gil': None,
     'gil_wait_mean_ms': 0.1,

@@ -54,6 +54,9 @@ nodes:
 """
 
 
+COSTS = {'cores', 'cpu (%)', 'GIL (%)', 'GIL wait mean (ms)', 'GIL wait max (ms)'}
+
+
 class Listener:
     """What was heard of each entity."""
 
@@ -146,6 +149,18 @@ def test_counts_survive_restarts_of_the_node(compose, listener, wait_for):
     assert child.stop() == 0
 
 
+def test_who_listens_hears_what_calls_cost(compose, listener, wait_for):
+    child = compose(SYSTEM, BEHAVIOURS)
+    child.wait_until_ready()
+    tick, system = '/sticky: timer tick', '/_composer_system: system'
+    wait_for(lambda: listener.values(tick).get('GIL (%)'), 'the share of the interpreter')
+    assert 0 <= float(listener.values(tick)['GIL (%)']) <= 100
+    wait_for(lambda: float(listener.values(tick)['cpu (%)']), 'the share of a processor')
+    wait_for(lambda: listener.values(system).get('GIL wait max (ms)'), 'waits')
+    assert int(listener.values(system)['cores']) >= 1
+    assert child.stop() == 0
+
+
 def test_it_can_be_turned_off(compose, peer, wait_for):
     child = compose(SYSTEM.replace('{period: 0.2}', 'false'), BEHAVIOURS, '--no-control')
     child.wait_until_ready()
@@ -197,7 +212,10 @@ def test_the_system_itself_has_a_status(compose, peer, listener, wait_for):
     name = '/_composer_system: system'
     wait_for(lambda: listener.values(name).get('state') == 'running', 'its state')
     path = compose.folder / 'system.yaml'
-    assert listener.values(name) | {'uptime (s)': '', 'host': ''} == {
+    wait_for(lambda: listener.values(name).keys() >= COSTS, 'what it costs')
+    known = listener.values(name) | {'uptime (s)': '', 'host': '', **dict.fromkeys(COSTS, '')}
+    assert known == {
+        **dict.fromkeys(COSTS, ''),
         'name': 'system',
         'file': str(path),
         'host': '',
