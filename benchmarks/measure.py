@@ -39,6 +39,8 @@ SUBJECTS = {
     # rclpy takes minutes to make so many nodes.
     'start_stop': Subject('benchmarks.start_stop', 60.0, most_rounds=1),
     'thousand': Subject('benchmarks.thousand', 3.0),
+    'workers': Subject('benchmarks.workers', 8.0),
+    'worker_hops': Subject('benchmarks.worker_hops', 4.0),
     'jitter': Subject('benchmarks.jitter', 6.0),
     'idle_cpu': Subject('benchmarks.idle_cpu', 5.0),
     'check': Subject('benchmarks.checking', most_rounds=2),

@@ -239,6 +239,41 @@ def _start_stop() -> list[Row]:
     ]
 
 
+def _workers() -> list[Row]:
+    def side(subject: str, name: str, size: int, key: str) -> Side:
+        return _side(subject, name, size, key)
+
+    def hop(what: str, size: int) -> Row:
+        ours, other = (side('worker_hops', name, size, 'us') for name in ('workers', 'rclpy'))
+        what = f'us from a worker to another, {what}, against two rclpy processes'
+        return Row(what, ours, other, times, '<=', 1.3)
+
+    busy, one = (side('workers', name, 4, 'rate') for name in ('workers', 'one'))
+    start, without = (
+        side('workers', f'start_{name}', 4, 'start_sec') for name in ('workers', 'one')
+    )
+    return [
+        Row(
+            '4 nodes of 0.8 cores, calls/s in workers against one process',
+            busy,
+            one,
+            times,
+            '>=',
+            1.8,
+        ),
+        Row(
+            's until 4 nodes in 4 workers are up, against one process',
+            start,
+            without,
+            times,
+            '<=',
+            2,
+        ),
+        hop('a small message', 100),
+        hop('1 MB', 1_000_000),
+    ]
+
+
 def _at_rest_and_under_load() -> list[Row]:
     def jitter(what: str, key: str, target: float) -> Row:
         ours, threads = (_side('jitter', name, 0, key) for name in ('composer', 'threads'))
@@ -316,6 +351,7 @@ ROWS: list[Row] = [
     *_further_node(),
     *_thousand(),
     *_start_stop(),
+    *_workers(),
     *_at_rest_and_under_load(),
     *_check(),
     *_save_to_callback(),

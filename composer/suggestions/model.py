@@ -2,8 +2,8 @@
 
 The figures of a message that crosses between processes are the processor time of a plain rclpy
 node for a `sensor_msgs/msg/Image`, Fast DDS with shared memory, on an AMD EPYC of 2021. What has
-them measured is `python -m benchmarks.measure crossing_cost sending 100000` (bytes), and with
-`taking` for the other side.
+them measured is `python -m benchmarks.crossing_cost sending 1000000` (bytes), and `taking` for
+the other side.
 """
 
 from __future__ import annotations

@@ -31,6 +31,8 @@ TINY = {
     'soak': 100,
     'start_stop': 2,
     'thousand': 2,
+    'worker_hops': 100,
+    'workers': 1,
 }
 
 

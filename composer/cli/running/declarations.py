@@ -224,8 +224,9 @@ def suggest_command(  # noqa: PLR0913 - one for each option
 ) -> int:
     """Suggest which nodes of FILE should run in workers.
 
-    With the gain to expect, from what its callbacks cost while it ran: the running system of that name is watched, or a
-    recording of /diagnostics is read. The result is a layer, as in 'composer up FILE split.yaml'.
+    From what its callbacks cost while it ran: the running system of that name is watched, or a
+    recording of /diagnostics is read. The result is a layer, as in 'composer up FILE split.yaml',
+    with the gain to expect.
     """
     from composer.cli.running.suggest import SuggestOptions, suggest
 
