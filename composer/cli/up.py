@@ -161,7 +161,7 @@ def _run(  # noqa: PLR0913 - as above
         with workers.importing():
             reading = import_reading(context, snapshot, report, workers)
         if reading is None:
-            workers.stop()
+            workers.kill_all()
         if rehearses:
             # What modules of behaviours do at the exit is not for here.
             flush_output()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copyreg
 import itertools
+import os
 import pickle
 import queue
 import threading
@@ -51,7 +52,8 @@ class Channel:
         descriptor: A socket, which belongs to the channel from now on.
         other: What is at the other end, in words.
         functions: What the other end may call.
-        on_lost: Called once when the other end has gone, in a thread of the channel.
+        on_lost: Called when the other end has gone, in a thread of the channel, or cannot be
+            reached any more.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Channel:
         on_lost: Callable[[], object] = lambda: None,
     ) -> None:
         self._connection = Connection(descriptor)
+        self._inode = os.fstat(descriptor).st_ino
         self._other = other
         self._functions = functions
         self._on_lost = on_lost
@@ -102,17 +105,22 @@ class Channel:
         """Call a function of the other end; nobody waits for it."""
         self._send((0, name, arguments))
 
-    def close(self) -> None:
-        """End the connection; calls that wait are lost."""
-        self._is_lost = True
-        with suppress(OSError):
-            self._connection.close()
+    @property
+    def is_intact(self) -> bool:
+        """Whether its descriptor is still its own: a behaviour may have closed it."""
+        try:
+            return os.fstat(self._connection.fileno()).st_ino == self._inode
+        except OSError:
+            return False
 
     def _send(self, message: tuple[Any, ...]) -> None:
         data = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
         # If the other end has gone, `_listen` notices.
         with self._sending, suppress(OSError):
-            self._connection.send_bytes(data)
+            if self.is_intact:
+                self._connection.send_bytes(data)
+                return
+        self._on_lost()
 
     def _listen(self) -> None:
         with suppress(OSError, EOFError):

@@ -47,7 +47,7 @@ class GuardianClient:
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._inode = os.fstat(self.descriptor).st_ino
         switch = _create_switch()
-        _print_stacks_at_signal()
+        print_stacks_at_signal()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own script
                 [
@@ -209,7 +209,7 @@ def _create_switch() -> int:
 
 
 @cache
-def _print_stacks_at_signal() -> None:
+def print_stacks_at_signal() -> None:
     """Let the guardian's signal, and crashes, print the stacks of all threads."""
     # When Python exits, it restores what was before its own handler.
     ctypes.CDLL(None).signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))

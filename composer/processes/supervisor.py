@@ -81,7 +81,7 @@ class ProcessSupervisor:
         self._lock = threading.Lock()
         self._stopping = threading.Event()
         self._tools: Tools | None = None
-        self._noun = 'process'
+        self._noun, self._all = 'process', 'all external processes'
 
     def start(self, process: ExternalProcess) -> None:
         """Start a process; after `stop`, or when it was removed, nothing happens.
@@ -237,7 +237,7 @@ class ProcessSupervisor:
     def _on_reaper_lost(self) -> None:
         # All that it had started was killed with it.
         if not self._stopping.is_set():
-            self._logger.error('the process reaper was killed, and all external processes with it')
+            self._logger.error(f'the process reaper was killed, and {self._all} with it')
             self._end_system(ExitCode.FAILED)
         for run in list(self._runs.values()):
             run.answer.put(_NO_REAPER)

@@ -59,7 +59,7 @@ class WorkerSupervisor(ProcessSupervisor):
         self, logger: EscapingLogger, end_system: Callable[[int], None], timeout_sec: float
     ) -> None:
         super().__init__((), logger, end_system, timeout_sec)
-        self._noun = 'worker'
+        self._noun, self._all = 'worker', 'all workers'
         self.on_end: Callable[[ExternalProcess], None] = lambda _process: None
 
     def _prepare(self, process: ExternalProcess, _tools: Tools) -> Launch:

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from composer.runtime.health.system_state import SystemState
 
 _LEVELS = ('ok', 'warn', 'error')
+# What is wrong with a worker in this state.
+_WORKER_STATES = {
+    'ended': 'it has ended, and its nodes are gone',
+    'restarting': 'it has ended, and is started again',
+    'no answer': 'it does not answer',
+}
 _P99 = 0.99
 _NS_PER_MS = 1e6
 
@@ -55,6 +61,11 @@ def status_answer(
         states: The state of each worker.
     """
     healths = [each['health'] for each in (own, *workers.values()) if each['health']]
+    healths += [
+        {'level': _LEVELS[-1], 'message': f"worker '{each['name']}': {_WORKER_STATES[state]}"}
+        for each in states
+        if (state := each['state']) in _WORKER_STATES
+    ]
     merged = {
         'lifecycles': {
             node: state

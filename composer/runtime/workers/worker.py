@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.processes.channel import ChannelLostError
 from composer.processes.external_process import describe_end
+from composer.processes.guardian import STACKS_SIGNAL
 from composer.processes.worker_supervisor import ConnectedProcess, worker_rules
 
 if TYPE_CHECKING:
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 # How long it may take until it is known how a process has ended.
 _END_SEC = 1.0
+# How long it may take to print the stacks.
+_STACKS_SEC = 0.3
 # What a worker does at its start, in this order.
 _STEPS = ('create', 'run_on_start', 'open', 'start_waiting', 'be_up')
 
@@ -30,6 +34,7 @@ class Worker:
         request: What it was last told to import.
         assignment: What it runs, or is to run once it is started again.
         is_up: Whether all its nodes have started.
+        is_silent: Whether it was told that it does not answer.
     """
 
     def __init__(
@@ -40,6 +45,7 @@ class Worker:
         self.request: ImportRequest | None = None
         self.assignment: Assignment | None = None
         self.is_up = False
+        self.is_silent = False
         self._supervisor = supervisor
 
     @property
@@ -89,7 +95,8 @@ class Worker:
         Raises:
             StartError: It failed.
         """
-        arguments = (self.assignment,) if step == 'create' else ()
+        given = {'create': self.assignment, 'import_behaviours': self.request}
+        arguments = (given[step],) if step in given else ()
         try:
             return self.call(step, *arguments)
         except ChannelLostError as error:
@@ -112,8 +119,8 @@ class Worker:
         Raises:
             ComposerError: They could not start.
         """
-        self.call('import_behaviours', self.request)
-        self.call('keep_imports')
+        self.do('import_behaviours')
+        self.do('keep_imports')
         self.start()
 
     def keep_to_rules(self) -> None:
@@ -132,11 +139,20 @@ class Worker:
         try:
             code, has_ended = self.call('stop', timeout_sec=timeout_sec)
         except ComposerError:
+            self.print_stacks()
             return ExitCode.FAILED, False
         run = self.process.run
         if run is not None:
             run.gone.wait(_END_SEC)
         return code, has_ended
+
+    def print_stacks(self) -> None:
+        """Have it print where its threads are, whatever they do; a stopped one cannot."""
+        run = self.process.run
+        if run is not None and run.code is None:
+            with suppress(ProcessLookupError):
+                os.kill(run.pid, STACKS_SIGNAL)
+            run.ended.wait(_STACKS_SEC)
 
     def remove(self, timeout_sec: float) -> None:
         """Stop it, and have its process killed if it does not end."""
@@ -152,7 +168,9 @@ class Worker:
     def describe(self) -> dict[str, Any]:
         """Return its state as data."""
         run = self.process.run
-        state = 'running' if self.is_alive and self.is_up else 'starting'
+        state = 'running' if self.is_up else 'starting'
+        if self.is_silent:
+            state = 'no answer'
         if not self.is_alive:
             state = 'ended' if self.process.is_done else 'restarting'
         return {
@@ -171,9 +189,3 @@ class Worker:
         if run is None or run.code is None:
             return f"worker '{self.name}' does not answer"
         return f"worker '{self.name}' {describe_end(run.code)} while it started"
-
-
-def drop_imports(worker: Worker) -> None:
-    """Have a worker go back to the modules that it had before."""
-    with suppress(ComposerError):
-        worker.call('drop_imports')

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.executor.after_fork import flush_output
 from composer.processes.channel import Channel
+from composer.processes.guardian import tell
+from composer.processes.guardian_client import print_stacks_at_signal
 from composer.processes.reaper import LINK
 from composer.runtime.behaviours.callables import BehaviourImportError, import_behaviour
 from composer.runtime.behaviours.import_check import shape_of
@@ -48,7 +50,7 @@ def main(name: str) -> None:
         if isinstance(stream, io.TextIOWrapper):
             # Whole lines, also if Python was told not to buffer: others write there, too.
             stream.reconfigure(line_buffering=True, write_through=False, errors='backslashreplace')
-    faulthandler.enable()
+    print_stacks_at_signal()
     worker = WorkerProcess(name)
     # What a user or the kernel sends to this process alone: its nodes stop, and that is a failure.
     signal.signal(signal.SIGTERM, worker.terminate)
@@ -71,7 +73,7 @@ class WorkerProcess:
             *(self.import_behaviours, self.keep_imports, self.drop_imports),
             *(self.create, self.run_on_start),
             *(self.open, self.start_waiting, self.be_up, self.stop),
-            *(self.status, self.top, self.restart_node, self.find_hidden),
+            *(self.ping, self.status, self.top, self.restart_node, self.find_hidden),
             *(self.begin_edit, self.wait_for_goals, self.make_way, self.apply_edit),
             *(self.commit_edit, self.undo_edit, self.follow),
         )
@@ -102,6 +104,11 @@ class WorkerProcess:
 
     def _on_lost(self) -> None:
         # Nothing of a system outlives its process.
+        if not self._channel.is_intact:
+            tell(
+                f"[FATAL] [composer]: worker '{self._name}' has lost its connection to the system:"
+                ' a behaviour may have closed descriptors that are not its own'
+            )
         os._exit(ExitCode.FAILED)
 
     def import_behaviours(self, request: ImportRequest) -> list[Shape | tuple[str, str | None]]:
@@ -190,6 +197,9 @@ class WorkerProcess:
     def _end_soon(self) -> None:
         # The answer is sent first.
         threading.Timer(0.01, self._ended.set).start()
+
+    def ping(self) -> None:
+        """Answer, as long as threads of Python run here."""
 
     def status(self) -> dict[str, Any]:
         """Return what this process says of itself."""

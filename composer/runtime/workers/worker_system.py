@@ -42,7 +42,7 @@ class WorkerSystem(System):
         self.is_told_to_stop = False
         super().__init__(
             self.read(assignment.snapshot, functions),
-            NoGuardian(owns_process=True),
+            _Keeper(channel),
             assignment.ros_arguments,
             assignment.log_levels,
         )
@@ -83,6 +83,18 @@ class WorkerSystem(System):
     def describe_top(self) -> dict[str, Any] | None:
         """Return the health of the entities; `None` if nothing is measured."""
         return self._control.describe_top()
+
+
+class _Keeper(NoGuardian):
+    """Stands for the guardian of a worker: the process of the system ends one that hangs."""
+
+    def __init__(self, channel: Channel) -> None:
+        super().__init__(owns_process=True)
+        self._channel = channel
+
+    def begin_stop(self) -> bool:
+        """Return whether the descriptors of this process are still its own."""
+        return self._channel.is_intact
 
 
 @record

@@ -21,6 +21,7 @@ from composer.runtime.workers.assignment import Assignment, ImportRequest
 from composer.runtime.workers.losses import describe_losses
 from composer.runtime.workers.worker import Worker
 from composer.runtime.workers.worker_edits import ChangedWorker, ReplacedWorker
+from composer.runtime.workers.worker_watch import WorkerWatch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -102,6 +103,7 @@ class Workers:
         self._lock = threading.RLock()
         self._stops: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
         self._stopping = 0
+        self._watch = WorkerWatch(lambda: list(self._workers.values()), self._log)
         self._supervisor = WorkerSupervisor(self._log, self._end_system, _KILL_SEC)
         self._supervisor.on_end = self._tell_losses
         self._supervisor.on_restart = self._begin_again
@@ -228,6 +230,8 @@ class Workers:
         self._supervisor.timeout_sec = self._spec.shutdown_timeout_sec
         for name, worker in self._workers.items():
             worker.assignment = self._assign(reading.snapshot, name)
+        if self.are_used:
+            self._watch.start()
 
     def _assign(self, snapshot: Snapshot, name: str) -> Assignment:
         return Assignment(
@@ -441,6 +445,7 @@ class Workers:
 
     def begin_stop(self) -> None:
         """Have all workers stop, while the process of the system does."""
+        self._watch.stop()
         workers = [*self._workers.values(), *self._coming.values()]
         self._stopping = len(workers)
         timeout_sec = self._supervisor.timeout_sec + _MARGIN_SEC
@@ -506,10 +511,7 @@ def _import(worker: Worker) -> dict[str, Any]:
     """Have a worker import its behaviours; return the shapes, or errors, by name."""
     request = worker.request
     assert request is not None  # noqa: S101 - it was made just now
-    if not request.stale:
-        # As the files are now, from bytecode if there is any.
-        request = replace(request, sources={})
-    shapes = worker.call('import_behaviours', request)
+    shapes = worker.do('import_behaviours')
     return dict(zip([each.name for each in request.behaviours], shapes, strict=True))
 
 
