@@ -45,6 +45,10 @@ needs_namespaces = pytest.mark.skipif(
     not _may_create(), reason='needs the right to create network namespaces'
 )
 
+takes_long = pytest.mark.skipif(
+    not os.environ.get('LONG'), reason='takes longer than a minute: LONG=1 runs it'
+)
+
 
 class _Namespaces:
     """Namespaces that exist while a process of theirs sleeps.
@@ -80,22 +84,25 @@ class _Namespaces:
         options = {'capture_output': True, 'text': True} | options
         return subprocess.run(self.within(*command), check=check, **options)
 
-    def pids(self):
-        """Return the processes in these namespaces."""
+    def pids(self, program=''):
+        """Return the processes in these namespaces, or those whose command contains a text."""
         own = Path(f'/proc/{self.pid}/ns/net').readlink()
         found = []
         for folder in Path('/proc').glob('[0-9]*'):
             with suppress(OSError):
-                if (folder / 'ns/net').readlink() == own:
+                is_here = (folder / 'ns/net').readlink() == own
+                if is_here and program in (folder / 'cmdline').read_text():
                     found.append(int(folder.name))
         return [pid for pid in found if pid != self.pid]
 
-    def kill(self):
-        """Kill all processes in these namespaces, as a loss of power does."""
-        while pids := self.pids():
+    def kill(self, program=''):
+        """Kill all processes in these namespaces, as a loss of power does, or some of them."""
+        while pids := self.pids(program):
             for pid in pids:
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
+            if program:
+                return
         for process in self._started:
             process.wait()
 
@@ -121,19 +128,19 @@ class Host(_Namespaces):
 
     def take_down(self):
         """Take its interface down, as a pulled cable does."""
-        self.run('ip', 'link', 'set', 'eth0', 'down')
+        self.run('ip', 'link', 'set', 'dev', 'eth0', 'down')
 
     def bring_up(self):
         """Plug the cable in again."""
-        self.run('ip', 'link', 'set', 'eth0', 'up')
+        self.run('ip', 'link', 'set', 'dev', 'eth0', 'up')
 
     def cut(self):
         """Lose all that it sends and is sent, which nothing on it is told."""
-        self._switch.run('ip', 'link', 'set', self.name, 'nomaster')
+        self._switch.run('ip', 'link', 'set', 'dev', self.name, 'nomaster')
 
     def mend(self):
         """Undo `cut`."""
-        self._switch.run('ip', 'link', 'set', self.name, 'master', 'br0')
+        self._switch.run('ip', 'link', 'set', 'dev', self.name, 'master', 'br0')
         self._switch.connect(self.name)
 
     def traffic(self):
@@ -156,7 +163,7 @@ class _Switch(_Namespaces):
         self.run('ip', 'link', 'set', 'br0', 'up')
 
     def connect(self, port):
-        self.run('ip', 'link', 'set', port, 'master', 'br0', 'up')
+        self.run('ip', 'link', 'set', 'dev', port, 'master', 'br0', 'up')
         flood = 'on' if self._forwards_multicast else 'off'
         self.run('bridge', 'link', 'set', 'dev', port, 'mcast_flood', flood)
 
@@ -195,7 +202,7 @@ class Network:
             ends = ('name', 'eth0', 'netns', host.pid, 'type', 'veth', 'peer', 'name', name)
             self._switch.run('ip', 'link', 'add', *ends)
         host.run('ip', 'address', 'add', f'{host.address}/24', 'dev', 'eth0')
-        host.run('ip', 'link', 'set', 'eth0', 'up')
+        host.run('ip', 'link', 'set', 'dev', 'eth0', 'up')
         self._switch.connect(name)
         return host
 

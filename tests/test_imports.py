@@ -28,7 +28,7 @@ ROOMS = (
         'rules',
         'diagnostics',
     ),
-    *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'interfaces'),
+    *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'network', 'interfaces'),
     *(
         'python_source',
         'inference',

@@ -10,12 +10,13 @@ import click
 from composer import confidential
 from composer.checks.checker import check_in_context, create_context
 from composer.cli.common.file_selection import load_given
-from composer.cli.common.host_part import find_part
+from composer.cli.common.host_part import find_part, take_part
 from composer.cli.common.output import show_findings, wants_colour
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.values.start_reader import StartValueReader
+from composer.network.variables import ros_variables
 from composer.planning import json_document, text
 from composer.planning.differences import compare
 from composer.planning.snapshot import take_snapshot
@@ -79,7 +80,7 @@ def plan(
     read = [each for each in contexts if each]
     if host:
         # Only the new one must have something there.
-        read = [*(each.on_host(host) for each in read[:-1]), find_part(read[-1], host)]
+        read = [*(take_part(each, host) for each in read[:-1]), find_part(read[-1], host)]
     old, *more = read
     result = (
         compare(take_snapshot(old), take_snapshot(more[0])) if more else _compare_with_running(old)
@@ -100,7 +101,7 @@ def _compare_with_running(context: CheckContext) -> Plan:
     from composer.runtime.environment import environment_set
 
     # They say on which graph it runs.
-    with environment_set(context.spec.environment), Client() as client:
+    with environment_set(ros_variables(context.spec)), Client() as client:
         system = Discovery(client).find(context.spec.running_name)
         answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
     old = decode_snapshot(read_answer(answer.text))

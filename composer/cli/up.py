@@ -19,6 +19,7 @@ from composer.errors import ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
+from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot import take_snapshot
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.cli.reload import Reloader
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import SystemSpec
 
 
 def up(  # noqa: PLR0913 - one for each option
@@ -99,7 +101,7 @@ def up(  # noqa: PLR0913 - one for each option
     check_ros()
     from composer.cli.reload import Reloader
 
-    variables = context.spec.environment
+    variables = _find_variables(context.spec)
     with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)
         check_log_folder(ros_arguments)
@@ -115,6 +117,18 @@ def up(  # noqa: PLR0913 - one for each option
             ends_process=ends_process,
             rehearses=rehearses,
         )
+
+
+def _find_variables(spec: SystemSpec) -> dict[str, str]:
+    """Return the environment that a system starts in; tell which peers it cannot look for."""
+    variables = ros_variables(spec)
+    if not (spec.host and spec.network):
+        return variables
+    variables, unknown = drop_unknown_peers(clear_others(variables, os.environ))
+    for name in unknown:
+        text = f"network: there is no address of '{name}' now: it must find this host itself"
+        click.echo(text, err=True)
+    return variables
 
 
 def _refuse_scenario(path: Path) -> None:

@@ -1,0 +1,1 @@
+"""How the processes of a system find each other across hosts."""

@@ -1,0 +1,83 @@
+"""Systems on two hosts find each other by each kind of discovery."""
+
+import pytest
+
+from tests.network_namespaces import needs_namespaces, takes_long
+
+SYSTEM = """
+    version: 1
+    nodes:
+      camera:
+        host: jetson
+        publishers: {image: std_msgs/msg/Int32}
+        timers: {take: {period: 0.1, behaviour: parts:take, publish: image}}
+        services: {focus: {type: std_srvs/srv/Trigger, behaviour: parts:focus}}
+      viewer:
+        host: base
+        wait_for: [{node: camera}, {topic: /image}, {service: /focus}]
+        subscriptions: {image: {type: std_msgs/msg/Int32, behaviour: parts:see}}
+"""
+CODE = """
+    def take(node):
+        node.state.count = getattr(node.state, 'count', 0) + 1
+        return node.state.count
+
+
+    def focus(node, request):
+        return {'success': True, 'message': ''}
+
+
+    def see(node, message):
+        node.logger.info(f'saw {message.data}')
+"""
+# What this network does not carry.
+OTHERS = {
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    'ROS_DISCOVERY_SERVER': '10.99.99.99:11811',
+}
+
+pytestmark = [pytest.mark.ros, needs_namespaces]
+
+
+@pytest.mark.parametrize(
+    ('network', 'forwards_multicast'),
+    [
+        ({'discovery': 'multicast', 'domain_id': 141}, True),
+        ({'discovery': 'peers'}, False),
+        ({'discovery': 'discovery_server', 'server': 'base'}, False),
+    ],
+    ids=['multicast', 'peers', 'discovery_server'],
+)
+def test_a_node_waits_for_one_on_another_host_and_hears_it(
+    create_hosts, network, forwards_multicast
+):
+    hosts = create_hosts('base', 'jetson', forwards_multicast=forwards_multicast)
+    hosts.write(SYSTEM, CODE, **network)
+    base, jetson = hosts.up('base', **OTHERS), hosts.up('jetson', **OTHERS)
+    base.wait_for('saw', times=3)
+    assert (jetson.stop(), base.stop()) == (0, 0)
+
+
+def test_hosts_that_may_not_multicast_find_nobody(create_hosts):
+    """Else the other tests would show nothing."""
+    hosts = create_hosts('base', 'jetson')
+    hosts.write(SYSTEM.replace('[{node', '[{timeout: 4, node'), CODE, discovery='multicast')
+    base, jetson = hosts.up('base'), hosts.up('jetson')
+    jetson.wait_for(' ready in ')
+    base.wait_for("waited 4 s for the node '/camera': there is no such node")
+
+
+@takes_long
+def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
+    """Who is there already, and who comes then, find each other by it."""
+    hosts = create_hosts('base', 'jetson')
+    hosts.write(SYSTEM, CODE, discovery='discovery_server', server='base')
+    base, jetson = hosts.up('base'), hosts.up('jetson')
+    base.wait_for('saw', times=3)
+    hosts['base'].kill('fast-discovery-server')
+    base.wait_for('Server is running', times=2)
+    assert jetson.stop() == 0
+    jetson = hosts.up('jetson')
+    jetson.wait_for(' ready in ')
+    heard = base.count('saw')
+    base.wait_for('saw', times=heard + 3)
