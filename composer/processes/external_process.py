@@ -25,6 +25,7 @@ class ProcessRun:
         answer: The reaper's answer to the request to start it.
         has_failed: Whether it was ended because it did not do what it was to do.
         ended: Set when `code` is known.
+        is_given_up: Whether it was killed on purpose.
         gone: Set when nothing of its process group is left.
         pid: Its process ID.
     """
@@ -39,6 +40,7 @@ class ProcessRun:
     pid: int = 0
     was_killed: bool = False
     has_failed: bool = False
+    is_given_up: bool = False
 
 
 class ExternalProcess:

@@ -125,6 +125,7 @@ class ProcessSupervisor:
         """Kill a process, which has failed."""
         run, tools = process.run, self._tools
         if run is not None and tools is not None and run.code is None:
+            run.is_given_up = True
             tools.reaper.stop(run.number, signal.SIGKILL, 0.0)
 
     def tell_ends(self) -> None:
@@ -227,7 +228,7 @@ class ProcessSupervisor:
 
     def _report_killed(self, run: ProcessRun) -> None:
         spec = run.process.spec
-        if spec.stop_signal != 'SIGKILL':
+        if spec.stop_signal != 'SIGKILL' and not run.is_given_up:
             run.was_killed = True
             self._logger.error(
                 f"{self._noun} '{spec.name}' did not end within {self._timeout_of(spec):g} s of "

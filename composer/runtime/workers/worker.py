@@ -31,7 +31,8 @@ class Worker:
     """A worker: its process, and what it runs.
 
     Attributes:
-        request: What it was last told to import.
+        request: What its process has imported, and imports when it is started again.
+        next_request: What an edit has it import.
         assignment: What it runs, or is to run once it is started again.
         is_up: Whether all its nodes have started.
         is_silent: Whether it was told that it does not answer.
@@ -43,6 +44,7 @@ class Worker:
         self.spec = spec
         self.process = ConnectedProcess(spec, functions)
         self.request: ImportRequest | None = None
+        self.next_request: ImportRequest | None = None
         self.assignment: Assignment | None = None
         self.is_up = False
         self.is_silent = False
@@ -89,14 +91,14 @@ class Worker:
         """
         return self.channel.call(name, *arguments, timeout_sec=timeout_sec)
 
-    def do(self, step: str) -> Any:
+    def do(self, step: str, *arguments: Any) -> Any:
         """Do one step of its start; see `WorkerProcess`.
 
         Raises:
             StartError: It failed.
         """
-        given = {'create': self.assignment, 'import_behaviours': self.request}
-        arguments = (given[step],) if step in given else ()
+        if step == 'create':
+            arguments = (self.assignment,)
         try:
             return self.call(step, *arguments)
         except ChannelLostError as error:
@@ -119,7 +121,7 @@ class Worker:
         Raises:
             ComposerError: They could not start.
         """
-        self.do('import_behaviours')
+        self.do('import_behaviours', self.request)
         self.do('keep_imports')
         self.start()
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from composer.errors import ComposerError
+from composer.processes.channel import ChannelLostError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -83,8 +84,15 @@ class ChangedWorker:
                 self._call('follow', self._worker.spec)
 
     def _call(self, name: str, *arguments: object) -> None:
-        if self._is_alive:
+        if not self._is_alive:
+            return
+        try:
             self._worker.call(name, *arguments)
+        except ChannelLostError:
+            # It is started again as the files say then, unless it is this edit that ends it.
+            self._is_alive = False
+            if name == 'apply_edit':
+                raise
 
 
 class ReplacedWorker:

@@ -43,6 +43,8 @@ _ANSWER_SEC = 1.0
 _MARGIN_SEC = 1.0
 _KILL_SEC = 0.5
 _EXIT_SEC = 5.0
+# How long an edit waits for a worker that is being started again.
+_RESTART_SEC = 10.0
 
 
 class _LazyLogger:
@@ -100,7 +102,8 @@ class Workers:
         self._is_outdated: Callable[[], bool] = _never
         self._log = cast('EscapingLogger', _LazyLogger())
         # Held while a worker is started again, or the system edited.
-        self._lock = threading.RLock()
+        self._lock = threading.Lock()
+        self._restarting: Worker | None = None
         self._stops: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
         self._stopping = 0
         self._watch = WorkerWatch(lambda: list(self._workers.values()), self._log)
@@ -188,39 +191,55 @@ class Workers:
             part = snapshot.spec.in_worker(worker.name)
             bindings[worker.name] = list(system_bindings(part))
             specs = {each.behaviour.name: each.behaviour for each in bindings[worker.name]}
-            worker.request = ImportRequest(
+            worker.next_request = ImportRequest(
                 list(specs.values()), sys.path, folders, snapshot.sources, stale
             )
         return (
             (binding, shapes[binding.behaviour.name])
-            for worker, shapes in self._each(workers, _import)
+            for worker, shapes in self._each([each for each in workers if each.is_alive], _import)
             for binding in bindings[worker.name]
         )
 
     def _next(self, spec: SystemSpec) -> list[Worker]:
-        """Return the workers of a system that are there or come, and whose processes run."""
+        """Return the workers of a system, those that come instead of those that are there."""
         both = {**self._workers, **self._coming}
-        wanted = used_workers(spec) if self.are_used else ()
-        return [both[name] for name in wanted if name in both and both[name].is_alive]
+        return [both[name] for name in used_workers(spec)]
 
     @contextmanager
     def importing(self) -> Iterator[None]:
-        """Keep what was imported in the block, and the workers that came; not if it raises."""
+        """Keep what was imported in the block, and the workers that came; not if it raises.
+
+        No worker is started again meanwhile.
+        """
+        with self._restarting_none():
+            try:
+                yield
+            except BaseException:
+                self._each_call('drop_imports')
+                coming, self._coming = list(self._coming.values()), {}
+                for worker in coming:
+                    worker.remove(_KILL_SEC)
+                raise
+            self._each_call('keep_imports')
+            for worker in {**self._workers, **self._coming}.values():
+                worker.request = worker.next_request
+
+    @contextmanager
+    def _restarting_none(self) -> Iterator[None]:
+        """Wait until no worker is being started again; one that takes long begins anew later."""
+        while not self._lock.acquire(timeout=_RESTART_SEC):
+            if self._restarting is not None:
+                self._supervisor.kill(self._restarting.process)
         try:
             yield
-        except BaseException:
-            self._end_imports('drop_imports')
-            coming, self._coming = list(self._coming.values()), {}
-            for worker in coming:
-                worker.remove(_KILL_SEC)
-            raise
-        self._end_imports('keep_imports')
+        finally:
+            self._lock.release()
 
-    def _end_imports(self, how: str) -> None:
+    def _each_call(self, name: str) -> None:
         for worker in {**self._workers, **self._coming}.values():
             if worker.is_alive:
                 with suppress(ComposerError):
-                    worker.call(how)
+                    worker.call(name)
 
     def bind(self, system: SystemOfWorkers, reading: Reading) -> None:
         """Be the workers of a system that runs as `reading`, from its start on."""
@@ -388,13 +407,12 @@ class Workers:
         self, new: Reading, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
     ) -> Iterator[None]:
         """Edit the system in the block; it runs as `new` says afterwards, unless that raises."""
-        with self._lock:
-            self._aborts_goals, self._is_outdated = aborts_goals, is_outdated
-            try:
-                yield
-                self._spec = new.snapshot.spec
-            finally:
-                self._aborts_goals = self._is_outdated = _never
+        self._aborts_goals, self._is_outdated = aborts_goals, is_outdated
+        try:
+            yield
+            self._spec = new.snapshot.spec
+        finally:
+            self._aborts_goals = self._is_outdated = _never
 
     def _adopt(self, name: str, worker: Worker | None) -> None:
         self._coming.pop(name, None)
@@ -418,6 +436,7 @@ class Workers:
             if worker is None or self._stopping:
                 return
             worker.is_up = False
+            self._restarting = worker
             try:
                 worker.begin_again()
             except ComposerError as error:
@@ -426,6 +445,8 @@ class Workers:
                     # Its end is one more, after which it is started again.
                     self._supervisor.kill(process)
                 return
+            finally:
+                self._restarting = None
         self._log.warning(f"worker '{worker.name}' was started again, with its nodes")
 
     def _worker_of(self, process: ExternalProcess) -> Worker | None:
@@ -451,7 +472,10 @@ class Workers:
         timeout_sec = self._supervisor.timeout_sec + _MARGIN_SEC
 
         def stop(worker: Worker) -> None:
-            self._stops.put(worker.stop(timeout_sec))
+            code, has_ended = worker.stop(timeout_sec)
+            if not has_ended:
+                self._log.error(f"worker '{worker.name}' has not stopped in time")
+            self._stops.put((code, has_ended))
 
         for worker in workers:
             threading.Thread(target=stop, args=(worker,), daemon=True).start()
@@ -509,9 +533,9 @@ def _part(snapshot: Snapshot, name: str) -> Snapshot:
 
 def _import(worker: Worker) -> dict[str, Any]:
     """Have a worker import its behaviours; return the shapes, or errors, by name."""
-    request = worker.request
+    request = worker.next_request
     assert request is not None  # noqa: S101 - it was made just now
-    shapes = worker.do('import_behaviours')
+    shapes = worker.do('import_behaviours', request)
     return dict(zip([each.name for each in request.behaviours], shapes, strict=True))
 
 
