@@ -74,7 +74,7 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
         'network_mode': 'host',
         'ipc': 'host',
         **({'cap_add': ['SYS_NICE']} if part.lowest_nice < 0 else {}),
-        **_environment(export),
+        **_environment(export, part),
         'volumes': [
             {
                 'type': 'bind',
@@ -94,8 +94,8 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
     }
 
 
-def _environment(export: Export) -> dict[str, Any]:
-    entries = [_literal(f'{name}={value}') for name, value in sorted(export.variables.items())]
+def _environment(export: Export, part: HostPart) -> dict[str, Any]:
+    entries = [_literal(f'{name}={value}') for name, value in sorted(part.variables.items())]
     for name, must_be_set in export.read.items():
         # Values of the environment stand in no file: Compose takes them from its own.
         advice = 'set it in the environment, or in a file .env beside this one'

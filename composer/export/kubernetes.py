@@ -170,15 +170,13 @@ def _container(export: Export, part: HostPart) -> dict[str, Any]:
     inner = PROJECT / export.folder.relative_to(export.root)
     words = export.arguments(part, PROJECT)
     needs_nice = part.lowest_nice < 0
-    probe = {'exec': {'command': ['composer', 'ps', _literal(part.name)]}, 'timeoutSeconds': 20}
     return {
         'name': 'composer',
         'image': export.image,
         'args': [_literal(each) for each in ('composer', *words)],
         'workingDir': str(inner),
-        'env': [*_environment(export)],
-        'startupProbe': {**probe, 'periodSeconds': 10, 'failureThreshold': 60},
-        'livenessProbe': {**probe, 'periodSeconds': 30, 'failureThreshold': 3},
+        'env': [*_environment(export, part)],
+        **_probes(part),
         'securityContext': {
             # Capabilities are for root alone.
             'runAsNonRoot': not needs_nice,
@@ -199,9 +197,20 @@ def _container(export: Export, part: HostPart) -> dict[str, Any]:
     }
 
 
-def _environment(export: Export) -> list[dict[str, Any]]:
+def _probes(part: HostPart) -> dict[str, Any]:
+    if not part.answers_alone:
+        # It must not be killed because the host of the discovery server is away.
+        return {}
+    probe = {'exec': {'command': ['composer', 'ps', _literal(part.name)]}, 'timeoutSeconds': 20}
+    return {
+        'startupProbe': {**probe, 'periodSeconds': 10, 'failureThreshold': 60},
+        'livenessProbe': {**probe, 'periodSeconds': 30, 'failureThreshold': 3},
+    }
+
+
+def _environment(export: Export, part: HostPart) -> list[dict[str, Any]]:
     # The root file system cannot be written.
-    variables = {**export.variables, 'HOME': '/tmp'}  # noqa: S108 - of the container
+    variables = {**part.variables, 'HOME': '/tmp'}  # noqa: S108 - of the container
     entries: list[dict[str, Any]] = [
         {'name': name, 'value': _literal(value)} for name, value in sorted(variables.items())
     ]

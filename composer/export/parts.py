@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from composer.confidential import conceal, origin_of
+from composer.confidential import conceal
 from composer.errors import ComposerError
+from composer.network.servers import with_servers
+from composer.network.variables import PEERS, clear_others, ros_variables
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -21,11 +23,16 @@ Scope: TypeAlias = Literal['user', 'system']
 _GRAPH_VARIABLES = (
     'ROS_DOMAIN_ID',
     'ROS_AUTOMATIC_DISCOVERY_RANGE',
-    'ROS_STATIC_PEERS',
+    PEERS,
     'ROS_LOCALHOST_ONLY',
     'ROS_DISCOVERY_SERVER',
+    'ROS_SUPER_CLIENT',
     'RMW_IMPLEMENTATION',
+    'ZENOH_CONFIG_OVERRIDE',
 )
+# Of these, what a file may say. ROS starts with no peer whose name is not known, as that of a host
+# that is off: Composer looks for them when it starts, and what asks it needs none.
+_WRITTEN_VARIABLES = tuple(each for each in _GRAPH_VARIABLES if each != PEERS)
 # What holds on this computer alone: where programs and settings are.
 _COMPUTER_VARIABLES = (
     'FASTDDS_DEFAULT_PROFILES_FILE',
@@ -61,6 +68,8 @@ class HostPart:
         lowest_nice: The lowest nice value of its workers, or 0.
         scope: Whose service manager runs it.
         user: Who runs it, if that is the one of the system; empty for who exports it.
+        variables: Those of ROS to set, for programs on this computer or on any.
+        answers_alone: Whether it can be asked whatever becomes of other hosts.
     """
 
     system: str
@@ -69,6 +78,8 @@ class HostPart:
     user: str
     stop_sec: float
     lowest_nice: int
+    variables: Mapping[str, str]
+    answers_alone: bool
 
     @property
     def name(self) -> str:
@@ -88,7 +99,6 @@ class Export:
         given: The file and its layers, absolute.
         words: The arguments, and options, that follow these on the command line.
         files: All files of the project that the system is known to need, absolute.
-        variables: Variables of ROS to set, for programs on this computer or on any.
         read: Names of variables that the system reads when it starts, and whether they are set
             here: then it may not start without.
         image: The container image to run; empty to build one.
@@ -104,7 +114,6 @@ class Export:
     given: tuple[Path, ...]
     words: tuple[str, ...]
     files: tuple[Path, ...]
-    variables: Mapping[str, str]
     read: Mapping[str, bool]
     has_interfaces: bool
     image: str
@@ -121,52 +130,60 @@ class Export:
 
 
 def list_hosts(spec: SystemSpec) -> list[str]:
-    """Return the names of the hosts that nodes and processes of a system run on."""
+    """Return the names of the hosts that run something: nodes, processes, or a server."""
     entries: list[NodeSpec | ProcessSpec] = [*spec.nodes.values(), *spec.processes.values()]
-    return sorted({each.host for each in entries} - {''})
+    hosts = {each.host for each in entries} - {''}
+    return sorted(hosts | ({spec.network.server} - {''} if hosts and spec.network else set()))
 
 
-def list_parts(spec: SystemSpec, scope: Scope | None = None) -> list[HostPart]:
+def list_parts(
+    spec: SystemSpec, *, stays_here: bool, scope: Scope | None = None
+) -> list[HostPart]:
     """Return the parts of a system, by the names of their hosts.
 
     Args:
+        stays_here: Whether they will run on this computer, with the ROS that is sourced.
         scope: Whose service managers run them; `None` for what their hosts say.
     """
     hosts = list_hosts(spec)
-    if not hosts:
-        return [_part(spec, '', scope)]
-    return [_part(spec.on_host(host), host, scope) for host in hosts]
+    parts = [with_servers(spec.on_host(host)) for host in hosts] or [spec]
+    return [_part(each, scope, stays_here=stays_here) for each in parts]
 
 
-def _part(spec: SystemSpec, name: str, scope: Scope | None) -> HostPart:
-    host = spec.hosts.get(name)
+def _part(spec: SystemSpec, scope: Scope | None, *, stays_here: bool) -> HostPart:
+    host = spec.hosts.get(spec.host)
     return HostPart(
         system=spec.name,
-        host=name,
+        host=spec.host,
         scope=scope or (host.systemd if host else 'user'),
         user=host.user if host else '',
         stop_sec=spec.longest_stop_sec + _STOP_MARGIN_SEC,
         lowest_nice=min([0, *(each.nice or 0 for each in spec.workers.values())]),
+        variables=_find_variables(spec, stays_here=stays_here),
+        answers_alone=not spec.network
+        or spec.network.discovery in ('multicast', 'peers')
+        or spec.network.server == spec.host,
     )
 
 
-def find_variables(spec: SystemSpec, *, stays_here: bool) -> dict[str, str]:
-    """Return the variables of ROS that a system runs with.
+def _find_variables(spec: SystemSpec, *, stays_here: bool) -> dict[str, str]:
+    """Return the variables of ROS that a part runs with, for itself and for what asks it.
 
     Those of the file win. Values that it has from variables itself are left out: the system
     reads them again where it runs.
-
-    Args:
-        stays_here: Whether it will run on this computer, with the ROS that is sourced.
     """
     names = [*_GRAPH_VARIABLES, *(_COMPUTER_VARIABLES if stays_here else ())]
     names += _SOURCED_VARIABLES if stays_here and _SOURCED in os.environ else ()
-    found = {name: os.environ[name] for name in names if name in os.environ}
-    written = {name: spec.environment[name] for name in names if name in spec.environment}
-    if spec.network and spec.network.domain_id is not None:
-        written['ROS_DOMAIN_ID'] = str(spec.network.domain_id)
-    known = {name: value for name, value in written.items() if origin_of(value) is None}
-    return {name: value for name, value in found.items() if name not in written} | known
+    shell = {name: os.environ[name] for name in names if name in os.environ}
+    written = ros_variables(spec)
+    if spec.host and spec.network:
+        written = clear_others(written, shell)
+    known = {
+        name: value
+        for name, value in written.items()
+        if name in _WRITTEN_VARIABLES and value and conceal(value) == value
+    }
+    return {name: value for name, value in shell.items() if name not in written} | known
 
 
 def choose_read(names: Collection[str]) -> dict[str, bool]:

@@ -49,7 +49,7 @@ def _render(export: Export, part: HostPart) -> str:
         folder=str(export.folder),
         stop_sec=part.stop_sec,
         scope=part.scope,
-        environment=export.variables,
+        environment=part.variables,
         environment_file=f'{"" if must_be_there else "-"}{file}' if export.read else '',
         user=part.user or pwd.getpwuid(os.getuid()).pw_name,
         reload=[*own_command(), 'reload', part.name],

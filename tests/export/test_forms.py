@@ -1,6 +1,7 @@
 """Each form of each shipped system passes the check of the program that reads it."""
 
 import json
+import os
 import re
 import shlex
 from importlib import resources
@@ -220,3 +221,49 @@ processes:
     items = workload['spec']['template']['spec']['volumes'][0]['configMap']['items']
     modes = {each['path']: each['mode'] for each in items}
     assert (modes['tool.py'], modes['robot_code/first.py']) == (0o555, 0o444)
+
+
+@pytest.mark.parametrize(
+    ('network', 'base', 'jetson', 'hosts_with_probes'),
+    [
+        ('multicast', {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, {}, ['base', 'jetson']),
+        (
+            '{discovery: peers, domain_id: 31}',
+            {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '31'},
+            {},
+            ['base', 'jetson'],
+        ),
+        (
+            '{discovery: discovery_server, server: base}',
+            {'ROS_DISCOVERY_SERVER': '127.0.0.1:11811', 'ROS_SUPER_CLIENT': 'TRUE'},
+            {'ROS_DISCOVERY_SERVER': 'b.example:11811'},
+            ['base'],
+        ),
+    ],
+)
+def test_what_asks_a_part_is_on_its_graph(
+    export, project, monkeypatch, network, base, jetson, hosts_with_probes
+):
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.delenv(name, raising=False)
+    # Of another system.
+    monkeypatch.setenv('ROS_STATIC_PEERS', '10.1.1.1')
+    inventory = f'hosts: {{base: {{address: b.example}}, jetson: {{}}}}\nnetwork: {network}\n'
+    file = project(FLEET + inventory)
+    wanted = {'base': base, 'jetson': base | jetson}
+    for host, unit in units_of(export('systemd', file)).items():
+        set_variables = dict(each.split('=', 1) for each in value_of(unit, 'Environment'))
+        of_ros = {name: value for name, value in set_variables.items() if name[:4] == 'ROS_'}
+        assert of_ros.pop('ROS_LOG_DIR', None) in (None, os.environ.get('ROS_LOG_DIR'))
+        assert of_ros == wanted[host.partition('@')[2].removesuffix('.service')]
+    _files, *workloads = check_kubernetes(export('kubernetes', file))
+    containers = [each['spec']['template']['spec']['containers'][0] for each in workloads]
+    assert [
+        each['args'][-1] for each in containers if 'livenessProbe' in each
+    ] == hosts_with_probes
+
+
+def test_the_host_of_a_discovery_server_has_a_part(export, project):
+    inventory = 'network: {discovery: discovery_server, server: tower}\n'
+    units = units_of(export('systemd', project(FLEET + inventory)))
+    assert 'composer-robot@tower.service' in units
