@@ -161,7 +161,8 @@ def up_command(  # noqa: PLR0913 - one for each option
         options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
         options += [f'--record={record}'] * (record is not None)
         options += [f'--topics={each}' for each in topics]
-        return start_detached(paths[0], [*options, *words, '--ros-args', *context.obj, '--'])
+        given = [*options, *words, '--ros-args', *context.obj, '--']
+        return start_detached(paths[0], given, host)
     return up(
         paths,
         arguments,

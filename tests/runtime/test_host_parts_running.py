@@ -1,5 +1,8 @@
 """The parts of two hosts, side by side: they make up the system, also after an edit."""
 
+import subprocess
+import sys
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -41,6 +44,19 @@ def test_each_part_runs_its_nodes_and_changes_with_the_files(compose):
     assert '-1 worker, -1 node' in jetson.wait_for_line('reloaded in')
     base.wait_for_line('[detector]: saw it', times=len(base.matching('saw it')) + 2)
     assert (base.stop(), jetson.stop()) == (0, 0)
+
+
+def test_a_part_in_the_background_has_a_log_of_its_own(compose, monkeypatch, capfd):
+    monkeypatch.chdir(compose.folder)
+    monkeypatch.setenv('ROS_LOG_DIR', str(compose.folder / 'log'))
+    path = compose.write(SYSTEM, CODE)
+    composer = [sys.executable, '-m', 'composer']
+    subprocess.run([*composer, 'up', path.name, '--host', 'base', '-d'], check=True)
+    subprocess.run([*composer, 'down', 'system@base'], check=True)
+    subprocess.run([*composer, 'logs', 'system@base'], check=True)
+    assert 'system@base: 1 node ready' in capfd.readouterr().out
+    other = subprocess.run([*composer, 'logs', 'system'], check=False)
+    assert other.returncode == 1
 
 
 def test_a_part_that_does_not_exist_is_told_with_those_that_do(compose):

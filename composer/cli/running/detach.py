@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _MOST_BYTES = 4096
 
 
-def start_detached(path: Path, arguments: Sequence[str]) -> int:
+def start_detached(path: Path, arguments: Sequence[str], host: str = '') -> int:
     """Start a system in a session of its own, and wait until it is up; return the exit code.
 
     If it does not come up, all that it has printed is printed here.
@@ -33,13 +33,14 @@ def start_detached(path: Path, arguments: Sequence[str]) -> int:
     Args:
         path: Its file.
         arguments: Those after `composer up`.
+        host: The host whose part it is; empty for the whole system.
 
     Raises:
         RosNotFoundError: There is no rclpy.
         ComposerError: Its log cannot be written.
     """
     check_ros()
-    log = _log_path(path)
+    log = _log_path(path, host)
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ready:
         # The kernel finds a free name.
         ready.bind('')
@@ -98,8 +99,9 @@ def _wait(process: subprocess.Popen[bytes], ready: socket.socket) -> bool:
         os.close(ended)
 
 
-def _log_path(path: Path) -> Path:
+def _log_path(path: Path, host: str) -> Path:
     name = '<stdin>' if str(path) == '-' else path.stem
+    name = f'{name}@{host}' if host else name
     stamp = time.strftime('%Y%m%d-%H%M%S')
     return find_log_folder() / f'{log_prefix(name)}{stamp}_{os.getpid()}.log'
 
