@@ -6,12 +6,15 @@ from time import monotonic
 from typing import Any, TypeGuard
 from weakref import WeakKeyDictionary
 
-from rclpy.action.client import ActionClient
-from rclpy.action.server import ActionServer
 from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 
 from composer.executor.event_fds import UNKNOWN_COUNT
+from composer.executor.sources.action_classes import (
+    is_action_client,
+    is_action_server,
+    is_half_made,
+)
 from composer.executor.sources.entity_sources import (
     ClientSource,
     ServiceSource,
@@ -32,8 +35,6 @@ from composer.executor.sources.waitable_sources import (
 from composer.executor.wait_set_thread import WaitSetThread
 
 _REST_FACTOR = 4
-# rclpy 9 adds an action client to its node first, and gives it a lock last.
-_IS_LOCKED_LAST = '_lock' in ActionClient.__init__.__code__.co_names
 
 
 class _NodeEntities:
@@ -154,7 +155,7 @@ class EntityRegistry:
             for source_class, entities in zip(classes, lists, strict=False)
             for entity in entities
         }
-        half_made = set(filter(_is_half_made, lists[-1]))
+        half_made = set(filter(is_half_made, lists[-1]))
         wanted.update((each, _class_for(each)) for each in lists[-1] if each not in half_made)
         for entity in seen.sources.keys() - wanted.keys():
             self._close(seen.sources.pop(entity))
@@ -184,17 +185,12 @@ class EntityRegistry:
 
 
 def _class_for(waitable: Any) -> type[EventSource]:
-    if isinstance(waitable, ActionServer | ActionClient):
+    if is_action_server(waitable) or is_action_client(waitable):
         return ActionSource
     if type(waitable) is EventHandler:
         is_seldom = is_checked_seldom(waitable.callback)
         return SeldomQosEventSource if is_seldom else QosEventSource
     return WaitableSource
-
-
-def _is_half_made(entity: Any) -> bool:
-    """Tell whether another thread is still making `entity`."""
-    return _IS_LOCKED_LAST and isinstance(entity, ActionClient) and not hasattr(entity, '_lock')
 
 
 def _is_waited_for(source: EventSource) -> TypeGuard[WaitSetSource]:

@@ -29,6 +29,7 @@ SharedName: TypeAlias = tuple[str, str]
 # Beside those of containers: those of queues and events.
 _CHANGING = CHANGING | {'put', 'put_nowait', 'set'}
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+_COMPOSER = 'composer'
 # A behaviour that calls more is too large to follow.
 _MOST_FUNCTIONS = 200
 _MOST_IMPORTS = 8
@@ -88,6 +89,9 @@ class SharedNames:
 
     def _find_functions(self, module: str, name: str) -> Iterator[_Function]:
         """Yield a function, a method, or what makes an instance of a class."""
+        # Nothing of Composer itself is shared by behaviours, and it is large.
+        if module.partition('.')[0] == _COMPOSER:
+            return
         source = self._modules.find(module)
         if source is None:
             return

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
-from composer.runtime.entities.action_clients import ActionClient
-from composer.runtime.entities.actions import ActionServer
 from composer.runtime.entities.parameters import NodeParameters
 from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
@@ -24,14 +22,28 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.nodes.live_node import LiveNode
 
+
+# These import `rclpy.action`, and with it NumPy: only for who has actions.
+def _create_action_client(node: LiveNode, spec: Any) -> LiveEntity:
+    from composer.runtime.entities.action_clients import ActionClient
+
+    return ActionClient(node, spec)
+
+
+def _create_action_server(node: LiveNode, spec: Any) -> LiveEntity:
+    from composer.runtime.entities.actions import ActionServer
+
+    return ActionServer(node, spec)
+
+
 # By section, in the order of creation: each takes the node and the record of one entity, and
 # is what is kept of it in `LiveNode.entities`.
 CREATORS: dict[str, Callable[[LiveNode, Any], LiveEntity]] = {
     'publishers': Publisher,
     'service_clients': ServiceClient,
-    'action_clients': ActionClient,
+    'action_clients': _create_action_client,
     'services': Service,
-    'actions': ActionServer,
+    'actions': _create_action_server,
     'subscriptions': Subscription,
     'timers': Timer,
 }

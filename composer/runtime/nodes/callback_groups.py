@@ -10,13 +10,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet, ref
 
-from rclpy.action import ActionServer
 from rclpy.callback_groups import (
     CallbackGroup,
     MutuallyExclusiveCallbackGroup,
     ReentrantCallbackGroup,
 )
 from rclpy.service import Service
+
+from composer.executor.sources.action_classes import is_action_server
 
 if TYPE_CHECKING:
     from composer.runtime.stop_request import StopRequest
@@ -65,7 +66,7 @@ class Gate:
         if self.is_paused:
             return False
         return (self.is_open and not self._stop.is_set) or (
-            self.serves and isinstance(entity, (Service, ActionServer))
+            self.serves and (isinstance(entity, Service) or is_action_server(entity))
         )
 
     def allows_events(self) -> bool:
@@ -96,7 +97,7 @@ class LifecycleGate(Gate):
         """See the base class; goals are rejected."""
         if not self.rests:
             return super().allows(entity)
-        is_taken = entity in self.dropping or isinstance(entity, ActionServer)
+        is_taken = entity in self.dropping or is_action_server(entity)
         return is_taken and super().allows(entity)
 
     def allows_events(self) -> bool:

@@ -181,6 +181,7 @@ class WorkerProcess:
         """Run from now on: all of the system has started."""
         self._running.be_up()
         gc.freeze()
+        gc.enable()
 
     def stop(self) -> tuple[int, bool]:
         """Stop the nodes; return the exit code, and whether all behaviours have ended."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from pathlib import Path
 sys.path[0] = str(Path(__file__).parents[3])
 
 if __name__ == '__main__':
+    # What is imported stays: to look for garbage in it takes a tenth of the time to start.
+    gc.disable()
     from composer.runtime.workers.worker_process import main
 
     main(sys.argv[1])
