@@ -39,7 +39,8 @@ from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import find_hidden
-from composer.runtime.workers.workers import find_moved, no_workers
+from composer.runtime.workers.parts import find_moved
+from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -247,7 +248,7 @@ class System:
                 with together('start_waiting'):
                     self.start_waiting()
             if not self.stop_requested:
-                self.workers.keep_up()
+                self.workers.keep_up(self._whole.spec)
         except BaseException:
             self.stop()
             raise

@@ -104,6 +104,20 @@ class Worker:
         except ChannelLostError as error:
             raise StartError(self.describe_failed_start()) from error
 
+    def import_behaviours(self) -> dict[str, Any]:
+        """Have its process import what comes next.
+
+        Returns:
+            The `Shape` of each behaviour, or the text and the help of an error, by name.
+
+        Raises:
+            StartError: A module has ended the process.
+        """
+        request = self.next_request
+        assert request is not None  # noqa: S101 - it was made just before
+        shapes = self.do('import_behaviours', request)
+        return dict(zip([each.name for each in request.behaviours], shapes, strict=True))
+
     def start(self) -> None:
         """Do all steps of its start, beside a system that is up.
 

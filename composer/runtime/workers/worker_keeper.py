@@ -1,0 +1,110 @@
+"""Starts workers again that have ended, and tells what goes with them."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, cast
+
+from composer.errors import ComposerError, ExitCode
+from composer.processes.worker_supervisor import WorkerSupervisor
+from composer.runtime.workers.losses import describe_losses
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from composer.language.specs import SystemSpec
+    from composer.processes.external_process import ExternalProcess
+    from composer.runtime.workers.worker import Worker
+    from composer.terminal import EscapingLogger
+
+# How long an edit waits for a worker that is being started again.
+_RESTART_SEC = 10.0
+# How long what does not stop gets to end.
+KILL_SEC = 0.5
+
+
+class _LazyLogger:
+    """The logger of the system, for what is made before ROS is imported."""
+
+    def __getattr__(self, level: str) -> Any:
+        from composer.runtime.logs import system_logger
+
+        return getattr(system_logger, level)
+
+
+class WorkerKeeper:
+    """Keeps the workers of a system up.
+
+    Args:
+        list_workers: Returns those that there are.
+        end_system: Ends the system with an exit code.
+
+    Attributes:
+        supervisor: Runs their processes.
+        log: The logger of the system.
+        spec: The system; `None` until all of it is up.
+        is_stopping: Whether none is started again.
+    """
+
+    def __init__(
+        self, list_workers: Callable[[], Iterable[Worker]], end_system: Callable[[int], None]
+    ) -> None:
+        self.log = cast('EscapingLogger', _LazyLogger())
+        self.supervisor = WorkerSupervisor(self.log, end_system, KILL_SEC)
+        self.supervisor.on_end = self._tell_losses
+        self.supervisor.on_restart = self._begin_again
+        self.supervisor.on_exit = self._act_on_end
+        self.spec: SystemSpec | None = None
+        self.is_stopping = False
+        self._list_workers = list_workers
+        self._end_system = end_system
+        # Held while a worker is started again, or the system edited.
+        self._lock = threading.Lock()
+        self._restarting: Worker | None = None
+
+    @contextmanager
+    def resting(self) -> Iterator[None]:
+        """Start none again while the block runs; one that takes long begins anew later."""
+        while not self._lock.acquire(timeout=_RESTART_SEC):
+            if self._restarting is not None:
+                self.supervisor.kill(self._restarting.process)
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+    def _begin_again(self, process: ExternalProcess) -> None:
+        """Run the nodes of a worker again whose process was started again."""
+        with self._lock:
+            worker = self._worker_of(process)
+            if worker is None or self.is_stopping:
+                return
+            worker.is_up = False
+            self._restarting = worker
+            try:
+                worker.begin_again()
+            except ComposerError as error:
+                self.log.error(f"worker '{worker.name}' could not start again: {error}")
+                if worker.is_alive:
+                    # Its end is one more, after which it is started again.
+                    self.supervisor.kill(process)
+                return
+            finally:
+                self._restarting = None
+        self.log.warning(f"worker '{worker.name}' was started again, with its nodes")
+
+    def _worker_of(self, process: ExternalProcess) -> Worker | None:
+        return next((each for each in self._list_workers() if each.process is process), None)
+
+    def _tell_losses(self, process: ExternalProcess) -> None:
+        worker = self._worker_of(process)
+        if worker is not None and worker.is_up and self.spec is not None:
+            name = worker.name
+            self.log.error(f"worker '{name}' has ended; {describe_losses(self.spec, name)}")
+
+    def _act_on_end(self, process: ExternalProcess, code: int) -> None:
+        worker = self._worker_of(process)
+        if worker is not None and worker.spec.required and self.spec is not None:
+            self.log.error(f"worker '{worker.name}' is required: the system ends")
+            self._end_system(ExitCode.FAILED if code else ExitCode.DONE)
