@@ -6,13 +6,13 @@ PYTHON ?= python3
 WORKERS ?= 4
 VENV := .venv
 ifdef ROS_DISTRO
-EXTRAS := graph,dev
+EXTRAS := graph,hosts,dev
 VENV_FLAGS := --system-site-packages
 else ifeq ($(ROS),kilted)
 VENV := .venv-kilted
-EXTRAS := ros-kilted,interfaces,graph,ros-kilted-test,dev
+EXTRAS := ros-kilted,interfaces,graph,hosts,ros-kilted-test,dev
 else
-EXTRAS := ros,interfaces,graph,ros-test,dev
+EXTRAS := ros,interfaces,graph,hosts,ros-test,dev
 endif
 BIN := $(VENV)/bin
 

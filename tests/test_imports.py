@@ -44,7 +44,7 @@ ROOMS = (
     *('virtual_time', 'recordings', 'simulation', 'scenarios'),
     'suggestions',
     'stubs',
-    'export',
+    *('export', 'hosts'),
     *('cli', 'pytest_plugin', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

@@ -25,6 +25,7 @@ from composer.cli.common.argument_types import (
 )
 from composer.cli.common.recording_options import RecordingOptions
 from composer.cli.exporting.declarations import export_command
+from composer.cli.hosts.declarations import COMMANDS as HOST_COMMANDS
 from composer.cli.recording.recording_commands import COMMANDS as RECORDING_COMMANDS
 from composer.cli.running.declarations import COMMANDS as RUNNING_COMMANDS
 from composer.cli.testing.declarations import test_command
@@ -116,6 +117,12 @@ def cli(context: click.Context) -> int:
     help='Record its topics to this MCAP file; a name without .mcap is a folder of rosbag2.',
 )
 @takes_topics
+@click.option(
+    '--hold',
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar='FILE',
+    help='Create all nodes, but run no behaviour while this file is there, for 60 s at most.',
+)
 # What a system that must start again asks of another process before.
 @click.option('--rehearse', 'rehearses', is_flag=True, hidden=True)
 @click.option(
@@ -134,6 +141,7 @@ def up_command(  # noqa: PLR0913 - one for each option
     is_asked: bool,
     record: Path | None,
     topics: tuple[str, ...],
+    hold: Path | None,
     rehearses: bool,
     wants_help: bool,
 ) -> int:
@@ -161,6 +169,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
         options += [f'--record={record}'] * (record is not None)
         options += [f'--topics={each}' for each in topics]
+        options += [f'--hold={hold}'] * (hold is not None)
         given = [*options, *words, '--ros-args', *context.obj, '--']
         return start_detached(paths[0], given, host)
     return up(
@@ -173,6 +182,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         watches=watches,
         is_asked=is_asked,
         recording=RecordingOptions(record, topics),
+        hold=hold,
         ends_process=True,
         rehearses=rehearses,
     )
@@ -595,5 +605,11 @@ def interfaces_show_command(name: str) -> int:
     return show(name)
 
 
-for _command in (*RUNNING_COMMANDS, *RECORDING_COMMANDS, test_command, export_command):
+for _command in (
+    *RUNNING_COMMANDS,
+    *HOST_COMMANDS,
+    *RECORDING_COMMANDS,
+    test_command,
+    export_command,
+):
     cli.add_command(_command)

@@ -47,6 +47,7 @@ def up(  # noqa: PLR0913 - one for each option
     watches: bool = False,
     is_asked: bool = True,
     recording: RecordingOptions | None = None,
+    hold: Path | None = None,
     ends_process: bool = False,
     rehearses: bool = False,
 ) -> int:
@@ -62,6 +63,7 @@ def up(  # noqa: PLR0913 - one for each option
         watches: Whether edits of the files change the running system.
         is_asked: Whether the system serves what `composer reload` and the like ask.
         recording: What is recorded of it; `None` for nothing.
+        hold: While this file is there, no behaviour starts; `None` for no such file.
         ends_process: Whether the process exits afterwards.
         rehearses: Whether to do only what comes before the system is created, and to print only
             what keeps it from that.
@@ -114,6 +116,7 @@ def up(  # noqa: PLR0913 - one for each option
             watches=watches,
             is_asked=is_asked,
             recording=recording or RecordingOptions(),
+            hold=hold,
             ends_process=ends_process,
             rehearses=rehearses,
         )
@@ -151,6 +154,7 @@ def _run(  # noqa: PLR0913 - as above
     watches: bool,
     is_asked: bool,
     recording: RecordingOptions,
+    hold: Path | None,
     ends_process: bool,
     rehearses: bool,
 ) -> int:
@@ -192,6 +196,7 @@ def _run(  # noqa: PLR0913 - as above
                 log_level_requests=log_levels,
                 recorder=recorder,
                 workers=workers,
+                hold=hold,
                 ends_process=ends_process,
             )
 

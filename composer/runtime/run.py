@@ -24,6 +24,7 @@ from composer.runtime.system import System
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from contextlib import AbstractContextManager
+    from pathlib import Path
     from types import FrameType
 
     from composer.language.specs import SystemSpec
@@ -48,6 +49,7 @@ def run_system(  # noqa: PLR0913 - one for each part
     log_level_requests: Sequence[str] = (),
     recorder: SystemRecorder | None = None,
     workers: Workers | None = None,
+    hold: Path | None = None,
     ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
@@ -67,6 +69,7 @@ def run_system(  # noqa: PLR0913 - one for each part
         recorder: Records the topics of the system; `None` if nothing does.
         workers: Run the nodes that are in workers, and have imported their behaviours; `None` if
             all run in this process.
+        hold: While this file is there, no behaviour starts; `None` for no such file.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it. Only then can the
             system start again.
@@ -95,6 +98,7 @@ def run_system(  # noqa: PLR0913 - one for each part
             recorder=recorder,
             workers=workers,
         )
+        system.hold = hold
         guardian.wait_until_begun()
         # A program that runs a system in itself tells its own parent.
         notify_socket = take_notify_socket() if ends_process else None

@@ -22,6 +22,7 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
+from composer.runtime.hold import wait_until_let_go
 from composer.runtime.lifecycle.driver import LifecycleDriver
 from composer.runtime.logs import is_output_unread, system_logger
 from composer.runtime.messages.local_delivery import LocalTopics
@@ -45,6 +46,7 @@ from composer.runtime.workers.workers import no_workers
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
     from contextlib import AbstractContextManager
+    from pathlib import Path
 
     from rclpy.context import Context
 
@@ -87,6 +89,7 @@ class System:
         workers: Run the nodes that are in workers; `None` if all run in this process.
 
     Attributes:
+        hold: While this file is there, no behaviour starts; `None` for no such file.
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
             only the end of this process ends them.
         state: What it says of itself.
@@ -106,6 +109,7 @@ class System:
     ) -> None:
         self._recorder = recorder
         self.workers = workers or no_workers()
+        self.hold: Path | None = None
         # What is told of the system, and what this process runs of it.
         self._whole, self._reading = reading, self.workers.own_part(reading)
         spec = self._reading.spec
@@ -240,6 +244,10 @@ class System:
         try:
             with together('create'):
                 self.create()
+            if self.hold is not None:
+                wait_until_let_go(self.hold, lambda: self.stop_requested)
+                if self.stop_requested:
+                    return
             with together('run_on_start') as wait_elsewhere:
                 waits = self.run_on_start()
             if (waits or any(wait_elsewhere)) and not self.stop_requested:

@@ -1,0 +1,1 @@
+"""The commands that bring systems to hosts and ask them there."""

@@ -1,0 +1,1 @@
+"""What `composer deploy` runs on a host: sent there each time, with Python's own library only."""

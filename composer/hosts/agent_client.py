@@ -1,0 +1,202 @@
+"""Asks the agent of a host: see `composer.hosts.agent.conversation`."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import shlex
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+from composer.hosts import agent
+from composer.hosts.connection import connect, import_asyncssh
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from composer.language.specs import HostSpec
+
+# Must be able to run on any Python, to say that it is too old.
+_BOOTSTRAP = r"""
+import os, sys, json
+os.write(1, (json.dumps(list(sys.version_info[:3])) + "\n").encode())
+if sys.version_info < (3, 11): sys.exit(0)
+def read(count):
+    data = b""
+    while len(data) < count:
+        more = os.read(0, count - len(data))
+        if not more: sys.exit(0)
+        data += more
+    return data
+sizes = [int(read(10)), int(read(10))]
+code, options = [read(each) for each in sizes]
+file = os.memfd_create("composer")
+os.write(file, code)
+sys.path.insert(0, "/proc/self/fd/%d" % file)
+from composer.hosts.agent.conversation import main
+main(json.loads(options))
+"""
+_PING_SEC = 3.0
+_SILENCE_SEC = 15.0
+_OLDEST = [3, 11]
+_NOT_FOUND = (126, 127)
+
+
+class HostLostError(ComposerError):
+    """A host does not answer any more."""
+
+
+class HostRefusedError(ComposerError):
+    """A host could not do what it was told."""
+
+
+class HostAgent:
+    """The agent on a host; `open` starts it.
+
+    Attributes:
+        host: The host.
+        is_lost: Whether it does not answer any more.
+    """
+
+    def __init__(self, host: HostSpec) -> None:
+        self.host = host
+        self.is_lost = False
+        self._connection: Any = None
+        self._process: Any = None
+        self._answers: dict[int, asyncio.Future[Any]] = {}
+        self._tasks: list[asyncio.Task[None]] = []
+        self._count = 0
+
+    async def open(self, options: Mapping[str, Any]) -> None:
+        """Connect, and start it.
+
+        Args:
+            options: See `composer.hosts.agent.conversation.main`.
+
+        Raises:
+            ComposerError: The host cannot be reached, or its Python cannot run Composer.
+        """
+        self._connection = await connect(self.host)
+        python = self.host.python
+        quoted = python if python.startswith('~/') else shlex.quote(python)
+        command = f'exec {quoted} -I -c {shlex.quote(_BOOTSTRAP)}'
+        self._process = await self._connection.create_process(command, encoding=None)
+        await self._check_python()
+        code, told = _agent_archive(), json.dumps(dict(options)).encode()
+        self._process.stdin.write(f'{len(code):10}{len(told):10}'.encode() + code + told)
+        self._tasks = [asyncio.create_task(self._read()), asyncio.create_task(self._ping())]
+
+    async def _check_python(self) -> None:
+        try:
+            line = await asyncio.wait_for(self._process.stdout.readline(), _SILENCE_SEC)
+        except TimeoutError as error:
+            msg = 'its Python does not answer'
+            raise self._lose(msg) from error
+        if not line:
+            done = await self._process.wait()
+            text = (done.stderr or b'').decode(errors='replace').strip()
+            if done.exit_status in _NOT_FOUND:
+                message = f"host {self.host.name} has no Python '{self.host.python}'"
+                advice = "install Python 3.11 or newer there, or name it by 'python:'"
+                raise HostRefusedError(message, help=advice)
+            message = f'host {self.host.name}: the login runs no commands: {text}'
+            raise HostRefusedError(message)
+        version = json.loads(line)
+        if version[:2] < _OLDEST:
+            found = '.'.join(map(str, version))
+            message = (
+                f"host {self.host.name}: '{self.host.python}' is Python {found}, "
+                'and Composer needs 3.11 or newer'
+            )
+            raise HostRefusedError(message, help="name a newer one by 'python:'")
+
+    async def call(self, operation: str, data: bytes = b'', **words: Any) -> Any:
+        """Let it do something; return what comes of it.
+
+        Raises:
+            HostRefusedError: It could not.
+            HostLostError: It does not answer any more.
+        """
+        if self.is_lost:
+            msg = 'the connection has ended'
+            raise self._lose(msg)
+        self._count += 1
+        number = self._count
+        request = {'id': number, 'do': operation, **words}
+        if data:
+            request['bytes'] = len(data)
+        answer = self._answers[number] = asyncio.get_running_loop().create_future()
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b'\n' + data)
+            await self._process.stdin.drain()
+            return await answer
+        except (OSError, import_asyncssh().Error) as error:
+            raise self._lose(str(error)) from error
+        finally:
+            self._answers.pop(number, None)
+
+    async def close(self) -> None:
+        """End the connection, and with it the agent."""
+        for task in self._tasks:
+            task.cancel()
+        if self._process is not None and not self.is_lost:
+            with suppress(OSError, import_asyncssh().Error, TimeoutError):
+                self._process.stdin.write_eof()
+                await asyncio.wait_for(self._process.wait(), _SILENCE_SEC)
+        if self._connection is not None:
+            self._connection.abort() if self.is_lost else self._connection.close()
+
+    async def _read(self) -> None:
+        reason = 'the connection has ended'
+        try:
+            while line := await self._process.stdout.readline():
+                self._take(json.loads(line))
+        except (OSError, import_asyncssh().Error) as error:
+            reason = str(error) or reason
+        self._give_up(reason)
+
+    def _take(self, answer: dict[str, Any]) -> None:
+        waiting = self._answers.get(answer['id'])
+        if waiting is None or waiting.done():
+            return
+        if 'error' in answer:
+            message = f'host {self.host.name}: {answer["error"]}'
+            waiting.set_exception(HostRefusedError(message, help=answer['help'] or None))
+        else:
+            waiting.set_result(answer['result'])
+
+    async def _ping(self) -> None:
+        while True:
+            await asyncio.sleep(_PING_SEC)
+            try:
+                await asyncio.wait_for(self.call('ping'), _SILENCE_SEC)
+            except TimeoutError:
+                self._give_up(f'no answer within {_SILENCE_SEC:g} s')
+            except ComposerError:
+                return
+
+    def _give_up(self, reason: str) -> None:
+        self.is_lost = True
+        for waiting in self._answers.values():
+            if not waiting.done():
+                waiting.set_exception(self._lose(reason))
+
+    def _lose(self, reason: str) -> HostLostError:
+        self.is_lost = True
+        return HostLostError(f'host {self.host.name} was lost: {reason}')
+
+
+def _agent_archive() -> bytes:
+    """Return the code of the agent, as Python imports it."""
+    stream = io.BytesIO()
+    folder = Path(agent.__file__).parent
+    with zipfile.ZipFile(stream, 'w', zipfile.ZIP_DEFLATED) as archive:
+        for package in ('composer', 'composer/hosts'):
+            archive.writestr(f'{package}/__init__.py', '')
+        for path in sorted(folder.glob('*.py')):
+            archive.writestr(f'composer/hosts/agent/{path.name}', path.read_bytes())
+    return stream.getvalue()

@@ -1,0 +1,286 @@
+"""A deployment: all hosts change together, or none does."""
+
+from __future__ import annotations
+
+import asyncio
+import getpass
+import os
+import socket
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+from composer.errors import ComposerError
+from composer.hosts.agent_client import HostAgent
+from composer.hosts.clock_skew import describe_skew, measure_skew
+from composer.hosts.host_parts import unit_of
+from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+
+    from composer.hosts.host_parts import Part
+    from composer.language.specs import HostSpec
+
+    BuildParts = Callable[[Mapping[str, Mapping[str, Any]]], Mapping[str, Part]]
+
+_ResultT = TypeVar('_ResultT')
+
+_HELD_SEC = 50.0
+_UP_SEC = 120.0
+_RELOAD_SEC = 60.0
+
+
+class DeployError(ComposerError):
+    """A deployment was given up; every host is as it was, but those that the message names."""
+
+
+class Deployment:
+    """The agents of the hosts of a system, while it is entered.
+
+    Args:
+        system: Its name.
+        tell: Takes lines that say what is done.
+    """
+
+    def __init__(
+        self, system: str, hosts: Iterable[HostSpec], tell: Callable[[str], None]
+    ) -> None:
+        self._system = system
+        self._tell = tell
+        self._agents = {host.name: HostAgent(host) for host in hosts}
+        self._facts: dict[str, Mapping[str, Any]] = {}
+        self._releases: dict[str, str] = {}
+
+    async def __aenter__(self) -> Self:
+        try:
+            await self._each(self._open)
+        except BaseException:
+            await self._close()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._close()
+
+    async def _close(self) -> None:
+        await asyncio.gather(*(each.close() for each in self._agents.values()))
+
+    async def _open(self, agent: HostAgent) -> None:
+        host = agent.host
+        await agent.open(
+            {
+                'folder': host.folder,
+                'system': self._system,
+                'unit': unit_of(self._system, host),
+                'scope': host.systemd,
+            }
+        )
+
+    async def look(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return what the hosts say of themselves, by their names.
+
+        Raises:
+            DeployError: One of them cannot run the system.
+        """
+
+        async def look(agent: HostAgent) -> None:
+            self._facts[agent.host.name] = await agent.call('look')
+            skew = describe_skew(agent.host.name, *await measure_skew(agent))
+            if skew is not None:
+                self._tell(f'warning: {skew}')
+
+        await self._each(look)
+        self._facts = {name: self._facts[name] for name in self._agents}
+        problems = []
+        for name, facts in self._facts.items():
+            if facts['systemd_problem']:
+                problems.append(f'host {name}: {facts["systemd_problem"]}')
+            if not facts['has_venv']:
+                python = '.'.join(map(str, facts['python'][:2]))
+                problems.append(
+                    f'host {name}: its Python has no module venv: install python{python}-venv'
+                )
+        if problems:
+            raise DeployError('\n'.join(problems))
+        return self._facts
+
+    async def lock(self) -> None:
+        """Keep other deployments away, and take back what one has left that was cut off.
+
+        Raises:
+            DeployError: There is one under way.
+        """
+        owner = f'{getpass.getuser()}@{socket.gethostname()} (process {os.getpid()})'
+        await self._each(lambda agent: agent.call('lock', owner=owner))
+
+    async def repair(self) -> None:
+        """Take back what a deployment has left that was cut off."""
+
+        async def repair(agent: HostAgent) -> None:
+            name = agent.host.name
+            if self._facts[name]['is_pending']:
+                told = await agent.call('roll_back')
+                self._tell(f'{name}: an earlier deployment was cut off: {told}')
+                self._facts[name] = await agent.call('look')
+
+        await self._each(repair)
+
+    def plan(self, parts: Mapping[str, Part]) -> list[HostPlan]:
+        """Return what is to be done on each host."""
+        return [plan_host(parts[name], facts) for name, facts in self._facts.items()]
+
+    def check(self, plans: Sequence[HostPlan]) -> None:
+        """Check that nothing stands against the plans.
+
+        Raises:
+            DeployError: A file would be overwritten that somebody else has written, or a disk is
+                too small.
+        """
+        conflicts = [
+            f'host {each.part.host.name}: {line}' for each in plans for line in each.conflicts
+        ]
+        if conflicts:
+            advice = 'take an edit over into the files here, or remove the file there'
+            raise DeployError('\n'.join(conflicts), help=advice)
+        found = (find_space_problem(each, self._facts[each.part.host.name]) for each in plans)
+        problems = [each for each in found if each is not None]
+        if problems:
+            advice = "free some space, or choose a folder on another disk by 'folder:'"
+            raise DeployError('\n'.join(problems), help=advice)
+
+    async def apply(self, plans: Sequence[HostPlan]) -> None:
+        """Let all hosts become what their plans say.
+
+        Raises:
+            DeployError: One of them failed, and all are as they were before.
+        """
+        changed = {each.part.host.name: each for each in plans if each.action != 'nothing'}
+        agents = [self._agents[name] for name in changed]
+
+        async def each(step: Callable[[HostAgent, HostPlan], Awaitable[_ResultT]]) -> None:
+            await self._each(lambda agent: step(agent, changed[agent.host.name]), agents)
+
+        try:
+            await each(self._prepare)
+            await each(lambda agent, _: agent.call('begin'))
+            await each(self._switch)
+            await each(self._hold)
+            await each(self._let_go)
+            await each(self._wait_until_up)
+            await each(lambda agent, _: agent.call('confirm'))
+        except BaseException as error:
+            told = await asyncio.shield(self._roll_back(agents))
+            if not isinstance(error, ComposerError):
+                for line in told:
+                    self._tell(line)
+                raise
+            raise DeployError('\n'.join([str(error), *told]), help=error.help) from error
+        await asyncio.shield(self._commit(agents))
+
+    async def _prepare(self, agent: HostAgent, plan: HostPlan) -> None:
+        part, name = plan.part, agent.host.name
+        for digest in plan.blobs:
+            await agent.call('receive', part.blobs[digest], name=digest)
+        if not plan.has_composer:
+            await agent.call('receive', part.composer.data, name=part.composer.name)
+            digest = part.manifest['composer']
+            await agent.call('unpack_composer', digest=digest, wheel=part.composer.name)
+        for wheel in plan.wheels:
+            await agent.call('receive_wheel', part.wheels[wheel].read_bytes(), name=wheel)
+        if part.manifest['venv'] not in self._facts[name]['venvs']:
+            self._tell(f'{name}: installing {len(part.wheels)} packages')
+        await agent.call(
+            'provide_venv',
+            digest=part.manifest['venv'],
+            wheels=sorted(part.wheels),
+            sees_system=part.sees_system,
+        )
+        self._releases[name] = await agent.call('stage', manifest=part.manifest)
+        if part.build:
+            self._tell(f'{name}: building interface packages')
+            await agent.call('run_release', release=self._releases[name], words=part.build)
+
+    async def _switch(self, agent: HostAgent, plan: HostPlan) -> None:
+        part, name = plan.part, agent.host.name
+        release = self._releases[name]
+        if plan.action == 'reload':
+            told = await agent.call(
+                'reload', release=release, name=part.name, timeout_sec=_RELOAD_SEC
+            )
+            for line in told.splitlines():
+                self._tell(f'{name}: {line.removeprefix(f"{part.name}: ")}')
+        else:
+            self._tell(f'{name}: starting')
+            await agent.call('switch', release=release, unit=part.unit, start=part.start)
+
+    async def _hold(self, agent: HostAgent, plan: HostPlan) -> None:
+        if plan.action != 'reload':
+            await agent.call('wait_until_held', timeout_sec=_HELD_SEC)
+
+    async def _let_go(self, agent: HostAgent, plan: HostPlan) -> None:
+        if plan.action != 'reload':
+            await agent.call('let_go')
+
+    async def _wait_until_up(self, agent: HostAgent, plan: HostPlan) -> None:
+        if plan.action != 'reload':
+            await agent.call('wait_until_up', timeout_sec=_UP_SEC)
+            self._tell(f'{agent.host.name}: up')
+
+    async def _roll_back(self, agents: Iterable[HostAgent]) -> list[str]:
+        """Take back what was done; return what became of each host."""
+
+        async def roll_back(agent: HostAgent) -> str:
+            name = agent.host.name
+            lost = f'{name}: lost; it goes back by itself, or at the next deployment'
+            if agent.is_lost:
+                return lost
+            try:
+                return f'{name}: {await agent.call("roll_back")}'
+            except ComposerError as error:
+                return lost if agent.is_lost else f'{error}'
+
+        return list(await asyncio.gather(*map(roll_back, agents)))
+
+    async def _commit(self, agents: Iterable[HostAgent]) -> None:
+        found = await asyncio.gather(
+            *(agent.call('commit') for agent in agents), return_exceptions=True
+        )
+        errors = [str(each) for each in found if isinstance(each, ComposerError)]
+        if errors:
+            errors.append('It may run the release before: deploy again when it is back.')
+            raise DeployError('\n'.join(errors))
+
+    async def remove(self) -> None:
+        """Stop the system on all hosts, and remove what was written for it."""
+
+        async def remove(agent: HostAgent) -> None:
+            name = agent.host.name
+            if self._facts[name]['release'] is None:
+                self._tell(f'{name}: there is nothing of {self._system}')
+                return
+            left = await agent.call('remove')
+            self._tell(f'{name}: removed')
+            for path in left:
+                self._tell(f'{name}: {path} was edited there, and is kept')
+
+        await self._each(remove)
+
+    async def _each(
+        self,
+        step: Callable[[HostAgent], Awaitable[_ResultT]],
+        agents: Iterable[HostAgent] | None = None,
+    ) -> list[_ResultT]:
+        """Do a step on all hosts at the same time.
+
+        Raises:
+            DeployError: It failed on some; all have ended it.
+        """
+        chosen = list(self._agents.values()) if agents is None else list(agents)
+        found = await asyncio.gather(*map(step, chosen), return_exceptions=True)
+        errors = [each for each in found if isinstance(each, BaseException)]
+        for error in errors:
+            if not isinstance(error, ComposerError):
+                raise error
+        if errors:
+            helps = dict.fromkeys(filter(None, (getattr(each, 'help', None) for each in errors)))
+            raise DeployError('\n'.join(map(str, errors)), help='\n'.join(helps) or None)
+        return [each for each in found if not isinstance(each, BaseException)]

@@ -1,0 +1,85 @@
+"""A system is deployed to two hosts, changed, and removed again."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.host_bed import why_there_is_none
+from tests.hosts.deployed import FOLDER, UNITS, Project, release_of
+from tests.running import wait_for
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(600),
+    pytest.mark.skipif(bool(why_there_is_none()), reason=why_there_is_none()),
+]
+
+
+def test_each_host_gets_its_part_and_runs_it(bed, tmp_path):
+    project = Project(bed, tmp_path / 'duo')
+    project.run('deploy', '--remove')
+    bed.give_packages()
+    done = project.deploy()
+    assert done.stderr.splitlines()[-1] == 'robot: 2 hosts changed'
+    assert '  + behaviours/talk.py\n' in done.stdout
+    assert project.runs(1)
+    project.hears('hello')
+    bed.keep_packages()
+
+
+def test_without_a_change_nothing_is_done(project):
+    before = project.states()
+    done = project.deploy()
+    assert sorted(done.stdout.splitlines()) == ['front: nothing to do', 'rear: nothing to do']
+    assert project.states() == before
+
+
+def test_one_changed_file_goes_over_and_the_system_runs_on(project):
+    pids = project.pids()
+    project.edit('behaviours/talk.py', 'hello', 'good day')
+    lines = project.deploy().stdout.splitlines()
+    assert lines[:2] == ['front: reload', '  ~ behaviours/talk.py']
+    assert lines[2].endswith(' kB to bring')
+    project.hears('good day')
+    assert project.pids() == pids
+    project.edit('behaviours/talk.py', 'good day', 'hello')
+    project.deploy()
+    project.hears('hello')
+    assert project.pids() == pids
+
+
+def test_a_plan_changes_nothing(project):
+    before = project.states()
+    project.edit('behaviours/talk.py', 'hello', 'good day')
+    assert '  ~ behaviours/talk.py' in project.deploy('--plan').stdout
+    assert project.states() == before
+    project.hears('hello')
+
+
+def test_a_clock_that_differs_is_told(project):
+    skewed = '#!/bin/sh\nexec python3 -c "import sys, time\nnow = time.time_ns\ntime.time_ns = lambda: now() + 200000000\nexec(sys.argv[1])" "$3"\n'
+    project.rear.run('sh', '-c', 'cat >skewed && chmod +x skewed', stdin=skewed)
+    done = project.deploy('--plan', '--set', 'hosts.rear.python=/home/robot/skewed')
+    assert 'warning: the clock of host rear is 200 ms ahead of the one here' in done.stderr
+
+
+def test_the_system_survives_a_boot(project):
+    release = release_of(project)
+    project.front.kill()
+    project.front.boot()
+    wait_for(lambda: project.runs(release), 'front')
+    project.hears('hello')
+
+
+def test_what_is_removed_leaves_nothing_but_what_others_wrote(project):
+    Path(project.folder / 'keep').touch()
+    live = f'{FOLDER}/systems/robot/live/files'
+    project.rear.run('sed', '-i', '1i # mine', f'{live}/robot.yaml')
+    done = project.run('deploy', '--remove')
+    assert not done.returncode, done.stderr
+    kept = f'{FOLDER}/edited/robot/files/robot.yaml'
+    assert f'rear: {kept} was edited there, and is kept' in done.stderr
+    assert project.rear.run('head', '-n1', kept).stdout == '# mine\n'
+    assert project.front.run('ls', FOLDER).returncode
+    for host in (project.front, project.rear):
+        assert not host.run('find', UNITS, '-name', '*composer*').stdout

@@ -1,0 +1,117 @@
+"""Nothing is done if a host lacks something, or has what others wrote."""
+
+from textwrap import dedent
+
+import pytest
+
+from tests.host_bed import why_there_is_none
+from tests.hosts.deployed import FOLDER, UNITS
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(600),
+    pytest.mark.skipif(bool(why_there_is_none()), reason=why_there_is_none()),
+]
+
+
+def test_a_file_that_was_edited_there_is_not_overwritten(project):
+    before = project.states()
+    edited = f'{FOLDER}/systems/robot/live/files/behaviours/talk.py'
+    project.front.run('sed', '-i', 's/hello/good day/', edited)
+    project.edit('behaviours/talk.py', 'hello', 'hey')
+    told = project.fail()
+    assert told.splitlines()[0] == f'error: host front: {edited} was edited there'
+    assert project.states() == before
+    # Who takes the edit over deploys it.
+    project.edit('behaviours/talk.py', 'hey', 'good day')
+    project.deploy()
+    project.hears('good day')
+    project.edit('behaviours/talk.py', 'good day', 'hello')
+    project.deploy()
+
+
+def test_a_unit_that_was_edited_there_is_not_overwritten(project):
+    unit = f'{UNITS}/composer-robot@rear.service'
+    project.rear.run('sed', '-i', 's/^Restart=.*/Restart=no/', unit)
+    before = project.states()
+    assert f'host rear: {unit} was edited there' in project.fail()
+    assert project.states() == before
+    project.rear.run('sed', '-i', 's/^Restart=.*/Restart=on-failure/', unit)
+    project.deploy()
+
+
+def test_a_unit_of_somebody_else_is_not_overwritten(project):
+    (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
+    unit = f'{UNITS}/composer-other@rear.service'
+    project.rear.run('sh', '-c', f'echo "# mine" >{unit}')
+    told = project.fail(system='other.yaml')
+    assert told.splitlines()[0] == (
+        f'error: host rear: {unit} is there, and was not written by Composer'
+    )
+    assert project.rear.run('cat', unit).stdout == '# mine\n'
+    project.rear.run('rm', unit)
+
+
+@pytest.mark.parametrize(
+    ('settings', 'message'),
+    [
+        ('python=/nowhere/python3', "host front has no Python '/nowhere/python3'"),
+        ('python=/home/robot/old', 'Python 3.8.10, and Composer needs 3.11 or newer'),
+        ('folder=/home/robot/small', 'its disk has 21 MB'),
+        ('folder=/home/robot/narrow', 'the disk is full'),
+        ('address=10.77.9.9', 'host front (10.77.9.9) cannot be reached'),
+        ('port=23', 'host front (front) cannot be reached'),
+        ('user=nobody', 'host front (front) accepts none of our keys'),
+        ('systemd=system', 'units of the system are for root'),
+    ],
+)
+def test_what_a_host_lacks_is_said_before_anything_is_done(project, settings, message):
+    script = """
+        cd /home/robot
+        mkdir -p small narrow
+        mountpoint -q small || mount -t tmpfs -o size=20m,uid=1777 tmpfs small
+        mountpoint -q narrow || mount -t tmpfs -o nr_inodes=60,uid=1777 tmpfs narrow
+        printf '#!/bin/sh\\nexec python3 -c "import sys; sys.version_info = (3, 8, 10); exec(sys.argv[1])" "$3"\\n' >old
+        chmod +x old
+    """
+    assert not project.front.run('sh', '-c', dedent(script), user='root').returncode
+    before = project.states()
+    (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
+    told = project.fail('--set', f'hosts.front.{settings}', system='other.yaml')
+    assert message in told
+    assert not project.front.run('sh', '-c', 'ls */*other* */*/*other*').stdout
+    assert project.states() == before
+    project.hears('hello')
+
+
+def test_a_python_without_venv_is_told(project):
+    folder = '/usr/lib/python3.11/venv'
+    project.front.run('sh', '-c', f'mount -t tmpfs none {folder}', user='root')
+    assert 'host front: its Python has no module venv' in project.fail()
+    project.front.run('umount', folder, user='root')
+
+
+def test_keys_are_those_of_ssh(project):
+    ssh = project.bed.home / '.ssh'
+    known = (ssh / 'known_hosts').read_text()
+    fingerprint = project.bed.run(
+        'ssh-keygen', '-lf', str(project.bed.folder / 'front.key.pub')
+    ).stdout.split()[1]
+    try:
+        (ssh / 'known_hosts').write_text('')
+        told = project.fail('--host', 'front')
+        assert f'error: the key of host front (front) is not known: {fingerprint}' in told
+        assert "accept it by 'ssh front'" in told
+        rear = project.bed['rear'].public_key
+        (ssh / 'known_hosts').write_text(f'front,10.77.1.1 {rear}\n')
+        told = project.fail('--host', 'front')
+        assert 'host front (front) has another key than known_hosts says' in told
+        (ssh / 'known_hosts').write_text(known)
+        (ssh / 'id_ed25519').rename(ssh / 'elsewhere')
+        assert 'accepts none of our keys' in project.fail('--host', 'front')
+        key = f'hosts.front.identity_file={ssh / "elsewhere"}'
+        project.deploy('--host', 'front', '--set', key, '--plan')
+    finally:
+        (ssh / 'known_hosts').write_text(known)
+        if (ssh / 'elsewhere').exists():
+            (ssh / 'elsewhere').rename(ssh / 'id_ed25519')

@@ -1,0 +1,107 @@
+"""If a host, the laptop or the network fails, all hosts are as they were before."""
+
+import signal
+import threading
+
+import pytest
+
+from tests.host_bed import why_there_is_none
+from tests.hosts.deployed import FOLDER, UNITS, release_of
+from tests.running import wait_for
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(600),
+    pytest.mark.skipif(bool(why_there_is_none()), reason=why_there_is_none()),
+]
+
+
+def test_if_one_host_cannot_start_all_go_back(project):
+    release = release_of(project)
+    project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
+    project.edit('robot.yaml', 'domain_id: 120', 'domain_id: 121')
+    told = project.fail()
+    assert 'error: host rear: the system did not start' in told
+    assert 'no sensor' in told
+    assert '  front: the release before was restored' in told
+    assert project.runs(release)
+    project.hears('hello')
+
+
+def test_a_first_deployment_that_fails_leaves_nothing(project):
+    (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
+    project.edit('other.yaml', 'domain_id: 120', 'domain_id: 122')
+    project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
+    told = project.fail(system='other.yaml')
+    assert '  front: all of it was removed again' in told
+    for host in (project.front, project.rear):
+        assert host.run('ls', f'{FOLDER}/systems').stdout.split() == ['robot']
+        assert 'other' not in host.run('ls', UNITS).stdout
+    assert project.runs(release_of(project))
+
+
+def starting(project):
+    """Begin a deployment in which the listener takes long to start; return it then."""
+    waits = 'import time\n    while not Path.home().joinpath("go").exists(): time.sleep(0.1)'
+    project.edit('behaviours/counting.py', 'def', 'from pathlib import Path\n\n\ndef')
+    project.edit('behaviours/counting.py', 'pass', waits)
+    project.edit('robot.yaml', 'domain_id: 120', 'domain_id: 123')
+    process = project.begin()
+    wait_for(
+        lambda: project.state('front')[0][:1] == ('active',) and project.state('front')[0][3],
+        'front',
+    )
+    return process
+
+
+def test_two_deployments_at_once_are_refused(project):
+    release = release_of(project)
+    process = starting(project)
+    assert "error: host front: 'robot' is being deployed by root@" in project.fail()
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert project.runs(release)
+    assert 'front: the release before was restored' in told
+
+
+def test_if_the_laptop_is_gone_the_hosts_go_back(project):
+    release = release_of(project)
+    process = starting(project)
+    process.kill()
+    process.communicate()
+    wait_for(lambda: project.runs(release), 'the release before')
+    project.hears('hello')
+
+
+def test_a_host_without_power_goes_back_when_it_is_on_again(project):
+    release = release_of(project)
+    process = starting(project)
+    project.rear.kill()
+    reader = threading.Thread(target=process.communicate)
+    reader.start()
+    project.rear.boot()
+    reader.join(60)
+    assert process.returncode == 1
+    wait_for(
+        lambda: project.state('rear')[0][:3] == ('active', 'enabled', f'releases/{release}'),
+        'rear',
+    )
+    project.hears('hello')
+    # The next deployment finds what is left.
+    project.restore()
+    assert 'rear: an earlier deployment was cut off' in project.deploy().stderr
+    assert project.runs(release)
+
+
+def test_a_host_that_is_cut_off_goes_back_by_itself(project):
+    release = release_of(project)
+    process = starting(project)
+    project.rear.cut()
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'error: host rear was lost' in told
+    assert '  front: the release before was restored' in told
+    project.rear.join()
+    wait_for(lambda: project.runs(release), 'the release before')
+    project.hears('hello')
