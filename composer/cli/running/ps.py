@@ -16,6 +16,8 @@ from composer.errors import ExitCode
 from composer.terminal import escape
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from composer.cli.running.client import RunningSystem
 
 _HEADER = ('NAME', 'STATE', 'HEALTH', 'NODES', 'UPTIME', 'LAST RELOAD', 'HOST', 'PID', 'FILE')
@@ -40,20 +42,30 @@ def list_running(name: str | None, *, format_name: str) -> int:
     unnamed = [
         {'name': '?', 'state': 'no answer', 'host': gethostname(), 'pid': each} for each in silent
     ]
-    if format_name == 'json':
-        documents = [_document(each) for each in systems]
-        click.echo(json.dumps({'version': 1, 'systems': documents + unnamed}, indent=2))
-        return code
-    if not systems and not unnamed:
+    if not systems and not unnamed and format_name != 'json':
         click.echo('no system runs on this ROS graph', err=True)
         return ExitCode.DONE
+    print_systems(systems, unnamed, format_name=format_name)
+    return code
+
+
+def print_systems(
+    systems: Sequence[RunningSystem],
+    unnamed: Sequence[Mapping[str, object]] = (),
+    *,
+    format_name: str,
+) -> None:
+    """Print systems, and processes that run systems whose names are not known."""
+    if format_name == 'json':
+        documents = [*map(_document, systems), *unnamed]
+        click.echo(json.dumps({'version': 1, 'systems': documents}, indent=2))
+        return
     notes = [note for each in systems for note in _notes(each)]
     rows = [
         *map(_row, systems),
         *([str(each.get(key.lower(), '')) for key in _HEADER] for each in unnamed),
     ]
     click.echo('\n'.join([*render_table(_HEADER, rows), *notes]))
-    return code
 
 
 def _document(system: RunningSystem) -> dict[str, object]:

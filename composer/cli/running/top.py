@@ -51,7 +51,7 @@ def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
         with client.asking(system, protocol.TOP) as ask:
             if once or format_name == 'json' or not _has_screen():
                 document = _wait_for_all(ask)
-                _print(document, view, format_name)
+                print_health(document, view, format_name)
                 return ExitCode.DONE
             return _watch(system, ask, view)
 
@@ -62,7 +62,8 @@ def _has_screen() -> bool:
     return sys.stdout.isatty() and sys.stdin.isatty() and can_draw()
 
 
-def _print(document: dict[str, Any], view: View, format_name: str) -> None:
+def print_health(document: dict[str, Any], view: View, format_name: str) -> None:
+    """Print what a system says of its entities."""
     entities = select_entities(document['entities'], view)
     if format_name == 'json':
         found = {'gil_kept_by': find_worst(document), 'entities': entities}

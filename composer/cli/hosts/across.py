@@ -1,0 +1,162 @@
+"""`composer ps`, `top`, `logs`, `reload` and `down` for all hosts of a system."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from composer import signals
+from composer.cli.common.argument_types import split_words
+from composer.cli.common.file_selection import load_given
+from composer.cli.common.output import show_findings
+from composer.cli.running import answer_forms
+from composer.cli.running.client import RunningSystem
+from composer.cli.running.ps import print_systems
+from composer.cli.running.top import print_health
+from composer.diagnostics import has_errors
+from composer.errors import ComposerError, ExitCode
+from composer.hosts.asking import (
+    Reply,
+    ask_all,
+    ask_composer,
+    follow_all,
+    log_command,
+    stop_command,
+)
+from composer.hosts.bundle import choose_hosts
+from composer.hosts.connection import import_asyncssh
+from composer.terminal import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.cli.running.top_table import View
+    from composer.language.specs import HostSpec
+
+_STOP_SEC = 60.0
+
+
+def ps_across(words: Sequence[str], *, format_name: str) -> int:
+    """Print the parts of a system; return the exit code: 1 if a host cannot be asked."""
+    system, hosts = _read(words)
+    replies = asyncio.run(ask_composer(system, hosts, 'ps', '--format=json'))
+    parts = [_part(system, each) for each in replies]
+    print_systems(parts, format_name=format_name)
+    _tell_unreachable(replies)
+    return _code(replies)
+
+
+def _part(system: str, reply: Reply) -> RunningSystem:
+    name = f'{system}@{reply.host.name}'
+    if reply.code is None:
+        return RunningSystem(name, '', None, 'unreachable')
+    if not reply.is_deployed:
+        return RunningSystem(name, '', None, 'not deployed')
+    with suppress(ComposerError, KeyError, IndexError):
+        (told,) = answer_forms.read_answer(reply.output)['systems']
+        status = answer_forms.read_answer(json.dumps({'version': 1, **told}), answer_forms.STATUS)
+        return RunningSystem(name, '', status)
+    return RunningSystem(name, '', None, 'not running')
+
+
+def top_across(words: Sequence[str], view: View, *, format_name: str) -> int:
+    """Print the health of the entities on all hosts once; return the exit code."""
+    system, hosts = _read(words)
+    replies = asyncio.run(ask_composer(system, hosts, 'top', '--once', '--format=json'))
+    merged: dict[str, Any] = {}
+    for each in replies:
+        with suppress(ComposerError):
+            told = answer_forms.read_answer(each.output, answer_forms.TOP)
+            for key, value in told.items():
+                known = merged.get(key)
+                merged[key] = known + value if isinstance(known, list) else value
+    if merged:
+        print_health(merged, view, format_name)
+    _tell_problems(replies)
+    return _code(replies, all_must=True)
+
+
+def reload_across(words: Sequence[str], timeout_sec: float, *, aborts_goals: bool) -> int:
+    """Let each part read its files again; return the exit code."""
+    system, hosts = _read(words)
+    options = [f'--timeout={timeout_sec:g}', *['--now'] * aborts_goals]
+    replies = asyncio.run(ask_composer(system, hosts, 'reload', *options, timeout_sec=timeout_sec))
+    for each in replies:
+        click.echo(escape_each(each.output), nl=False)
+    _tell_problems(replies)
+    return _code(replies, all_must=True)
+
+
+def down_across(words: Sequence[str], timeout_sec: float) -> int:
+    """Stop each part, until its host starts again or is deployed to; return the exit code."""
+    system, hosts = _read(words)
+    replies = asyncio.run(
+        ask_all(hosts, lambda host: stop_command(system, host), timeout_sec + _STOP_SEC)
+    )
+    for each in replies:
+        if each.code == 0:
+            click.echo(f'{escape(system)}@{escape(each.host.name)}: stopped')
+    _tell_problems(replies)
+    return _code(replies, all_must=True)
+
+
+def logs_across(words: Sequence[str], *, follows: bool) -> int:
+    """Print what the parts have said, each line with its host; return the exit code."""
+    system, hosts = _read(words)
+    width = max(len(host.name) for host in hosts)
+
+    def take(host: HostSpec, text: str) -> None:
+        click.echo(f'{escape(host.name):{width}} | {escape(text)}')
+
+    problems: list[str] = []
+    with suppress(KeyboardInterrupt), signals.interrupting():
+        follow = follow_all(hosts, lambda host: log_command(system, host, follows=follows), take)
+        problems = asyncio.run(follow)
+    for each in problems:
+        click.echo(f'error: {escape(each)}', err=True)
+    return ExitCode.FAILED if problems else ExitCode.DONE
+
+
+def _read(words: Sequence[str]) -> tuple[str, list[HostSpec]]:
+    """Return the name of a system, and its hosts.
+
+    Raises:
+        ComposerError: The file has errors, or no hosts.
+    """
+    import_asyncssh()
+    paths, arguments = split_words(words)
+    system = load_given(paths, arguments)
+    if system.spec is None or has_errors(system.diagnostics):
+        show_findings(system.diagnostics)
+        message = f"'{paths[0]}' has errors"
+        raise ComposerError(message)
+    return system.spec.name, choose_hosts(system.spec)
+
+
+def escape_each(text: str) -> str:
+    """Return lines that others have written, fit for a terminal."""
+    return ''.join(f'{escape(line)}\n' for line in text.splitlines())
+
+
+def _tell_unreachable(replies: Sequence[Reply]) -> None:
+    for each in replies:
+        if each.code is None:
+            click.echo(f'error: {escape(each.error)}', err=True)
+
+
+def _tell_problems(replies: Sequence[Reply]) -> None:
+    _tell_unreachable(replies)
+    for each in replies:
+        if each.code is not None and not each.is_deployed:
+            click.echo(f'error: host {escape(each.host.name)}: not deployed', err=True)
+        elif each.code:
+            click.echo(escape_each(each.error), nl=False, err=True)
+
+
+def _code(replies: Sequence[Reply], *, all_must: bool = False) -> int:
+    has_failed = any(each.code is None or (all_must and each.code) for each in replies)
+    return ExitCode.FAILED if has_failed else ExitCode.DONE

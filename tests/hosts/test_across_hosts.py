@@ -1,0 +1,94 @@
+"""Commands that are given files ask all hosts of these: each answers, or is a line of its own."""
+
+import json
+import signal
+import subprocess
+
+import pytest
+
+from tests.host_bed import why_there_is_none
+from tests.running import wait_for
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.timeout(600),
+    pytest.mark.skipif(bool(why_there_is_none()), reason=why_there_is_none()),
+]
+
+
+def test_ps_lists_the_parts_and_says_which_host_is_not_there(project):
+    done = project.run('ps')
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[:2] for line in done.stdout.splitlines()[1:]] == [
+        ['robot@front', 'running'],
+        ['robot@rear', 'running'],
+    ]
+    project.rear.lose(100)
+    done = project.run('ps', '--format', 'json')
+    project.rear.lose(0)
+    assert done.returncode == 1
+    front, rear = json.loads(done.stdout)['systems']
+    assert (front['name'], front['host'], front['nodes']) == ('robot@front', 'front', ['/talker'])
+    assert rear == {'name': 'robot@rear', 'state': 'unreachable'}
+    assert done.stderr.startswith('error: host rear (rear) cannot be reached: ')
+
+
+def test_top_shows_the_entities_of_all_parts(project):
+    done = project.run('top', '--format', 'json')
+    assert done.returncode == 0, done.stderr
+    entities = json.loads(done.stdout)['entities']
+    assert {each['node'] for each in entities} == {'/talker', '/listener'}
+
+
+def test_logs_have_the_host_at_each_line_and_follow_all(project):
+    done = project.run('logs')
+    assert done.returncode == 0, done.stderr
+    assert any(
+        line.startswith('front | ') and 'talks' in line for line in done.stdout.splitlines()
+    )
+    words = project.bed.command(*project.words('logs', '-f'))
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        words, stdout=pipe, stderr=pipe, text=True, **project.options
+    ) as process:
+        hosts = set()
+        while len(hosts) < 2:
+            hosts.add(process.stdout.readline().partition(' ')[0])
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert hosts == {'front', 'rear'}
+
+
+def test_what_is_down_stays_down_until_it_is_deployed(project):
+    done = project.run('reload')
+    assert (done.returncode, done.stdout) == (
+        0,
+        'robot@front: nothing has changed\nrobot@rear: nothing has changed\n',
+    )
+    done = project.run('down')
+    assert (done.returncode, done.stdout) == (0, 'robot@front: stopped\nrobot@rear: stopped\n')
+    assert [state[0] for state, _ in project.states()] == ['inactive', 'inactive']
+    done = project.run('ps')
+    assert done.stdout.count('not running') == 2
+    assert project.run('reload').returncode == 1
+    lines = project.deploy().stdout.splitlines()
+    assert sorted(lines) == ['front: start', 'rear: start']
+    wait_for(lambda: project.states()[0][0][0] == 'active', 'the system')
+
+
+def test_a_host_without_the_system_says_so(project):
+    (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
+    done = project.run('ps', system='other.yaml')
+    assert done.returncode == 0
+    assert done.stdout.count('not deployed') == 2
+
+
+def test_files_without_hosts_cannot_be_asked_for(project):
+    project.write('hosts.yaml', 'nodes: {}\n')
+    project.edit('robot.yaml', 'host: front', '')
+    project.edit('robot.yaml', 'host: rear', '')
+    done = project.run('ps')
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: 'robot' declares no hosts\n  help: give the layer that has 'hosts:'\n"
+    )
