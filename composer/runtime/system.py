@@ -19,6 +19,8 @@ from composer.runtime.external.components import Components
 from composer.runtime.external.exit_actions import ExitActions
 from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
+from composer.runtime.health.introductions import Introductions
+from composer.runtime.health.other_hosts import OtherHosts
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.health.system_state import Outcome, SystemState
 from composer.runtime.health.unmatched import GraphWatcher
@@ -49,6 +51,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rclpy.context import Context
+    from rclpy.node import Node as RosNode
 
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
@@ -57,6 +60,7 @@ if TYPE_CHECKING:
     from composer.processes.guardian_client import GuardianClient, NoGuardian
     from composer.runtime.control.control_services import Commands
     from composer.runtime.health.deliveries import Deliveries
+    from composer.runtime.health.unmatched import GraphObserver
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.workers.workers import Workers
@@ -130,7 +134,9 @@ class System:
         reserve(self._executor, 'the executor', 'shutdown')
         self._hang_watcher = HangWatcher(self._nodes, spec, self._executor.errors)
         self._graph_watcher = GraphWatcher(
-            lambda: [end for node in list(self._nodes.values()) for end in node.endpoints]
+            lambda: [end for node in list(self._nodes.values()) for end in node.endpoints],
+            self._find_graph_node,
+            self._create_observers(),
         )
         self._error_policy = ErrorPolicy(self.restart_node, self.shutdown)
         self._handle = self._create_handle(ros_arguments, log_levels)
@@ -159,6 +165,12 @@ class System:
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
         self._control = self._create_control(commands)
         self.workers.bind(self, reading)
+
+    def _find_graph_node(self) -> RosNode | None:
+        return next((node.ros for node in list(self._nodes.values())), self._control.ros)
+
+    def _create_observers(self) -> list[GraphObserver]:
+        return [Introductions(), OtherHosts(self._whole.spec)]
 
     def _create_control(self, commands: Commands | None) -> ControlNode:
         return ControlNode(

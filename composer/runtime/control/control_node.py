@@ -84,6 +84,11 @@ class ControlNode:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-control', daemon=True)
 
+    @property
+    def ros(self) -> RosNode | None:
+        """Its rclpy node; `None` while it needs none."""
+        return self._node
+
     def start(self, context: Context, ros_arguments: Sequence[str]) -> None:
         """Take the system's name, and create the node soon.
 

@@ -7,7 +7,7 @@ for incompatible types, which only the graph shows.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
@@ -180,22 +180,41 @@ def _one_after_the_other(first: _OnEvent | None, second: _OnEvent) -> _OnEvent:
     return call
 
 
+class GraphObserver(Protocol):
+    """Something that looks at the graph once a second."""
+
+    def check(self, node: RosNode) -> None:
+        """Look at it through a node."""
+
+
 class GraphWatcher(Watcher):
     """The thread that checks endpoints when the graph shows a reason to.
 
     Args:
         endpoints: Returns the present endpoints.
+        find_node: Returns a node that can ask the graph; `None` if there is none now.
+        observers: What else looks at the graph each time.
     """
 
-    def __init__(self, endpoints: Callable[[], Iterable[TopicEndpoint]]) -> None:
+    def __init__(
+        self,
+        endpoints: Callable[[], Iterable[TopicEndpoint]],
+        find_node: Callable[[], RosNode | None],
+        observers: Iterable[GraphObserver],
+    ) -> None:
         super().__init__('composer-graph', self._check_unless_destroyed, _PAUSE_SEC)
         self._endpoints = endpoints
+        self._find_node = find_node
+        self._observers = tuple(observers)
         self._seen: list[tuple[str, list[str]]] = []
 
     def _check_unless_destroyed(self) -> None:
         # A node may be destroyed meanwhile.
         with suppress(InvalidHandle):
             self._check_graph()
+            node = self._find_node()
+            for each in self._observers if node else ():
+                each.check(node)
 
     def _check_graph(self) -> None:
         endpoints = list(self._endpoints())

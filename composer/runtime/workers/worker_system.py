@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.processes.guardian_client import NoGuardian
 from composer.records import record
 from composer.runtime.control.control_node import ControlNode
+from composer.runtime.health.introductions import Introductions
 from composer.runtime.rewiring.reading import Reading
 from composer.runtime.system import System
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from composer.planning.snapshot import Snapshot
     from composer.processes.channel import Channel
     from composer.runtime.control.control_services import Commands
+    from composer.runtime.health.unmatched import GraphObserver
     from composer.runtime.workers.assignment import Assignment
 
 
@@ -65,6 +67,10 @@ class WorkerSystem(System):
     def shutdown(self, code: int) -> None:
         """Ask for the end of the whole system."""
         self._channel.tell('request_stop', code)
+
+    def _create_observers(self) -> list[GraphObserver]:
+        # Of hosts that are gone, the process of the system tells.
+        return [Introductions()]
 
     def _create_control(self, _commands: Commands | None) -> ControlNode:
         return ControlNode(
