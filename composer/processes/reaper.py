@@ -42,6 +42,8 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 # See the guardian, which need not kill what the reaper has started.
 _RLIMIT_LOCKS = 10
+# See the guardian.
+_STACKS_SIGNAL = signal.SIGRTMAX
 _KILL_SEC = 5.0
 _POLL_SEC = 0.02
 _CHUNK = 1 << 16
@@ -220,6 +222,8 @@ def _execute(request: dict[str, Any], descriptors: list[int], report: int, reape
             # The number may be that of the report, which is needed until the end.
             report = fcntl.fcntl(report, fcntl.F_DUPFD_CLOEXEC, LINK + 1)
             os.dup2(link, LINK)
+            # Composer may ask for the stacks before Python can print them.
+            signal.signal(_STACKS_SIGNAL, signal.SIG_IGN)
         doing = 'folder'
         if request['cwd'] is not None:
             os.chdir(request['cwd'])

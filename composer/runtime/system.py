@@ -97,7 +97,10 @@ class System:
         has_ended: Whether everything has ended. If not, behaviours still run after `stop`, and
             only the end of this process ends them.
         state: What it says of itself.
+        label: What it is called in the log.
     """
+
+    label = 'the system'
 
     def __init__(  # noqa: PLR0913 - one for each part
         self,
@@ -553,8 +556,8 @@ class System:
         try:
             calls = [(node.spec.key, node.running) for node in list(self._nodes.values())]
             system_logger.error(
-                'the system is broken, and ends. A behaviour may have closed descriptors that are '
-                'not its own, or replaced what all use. The last ones to begin were:\n'
+                f'{self.label} is broken, and ends. A behaviour may have closed descriptors that '
+                'are not its own, or replaced what all use. The last ones to begin were:\n'
                 f'{describe_last_calls(calls)}\n{reason}'
             )
         finally:

@@ -32,6 +32,14 @@ def needs_new_process(old: WorkerSpec, new: WorkerSpec) -> bool:
 
 def part_of(snapshot: Snapshot, name: str) -> Snapshot:
     """Return what the process of a worker is compared by; `''` is that of the system."""
-    part = replace(snapshot, spec=snapshot.spec.in_worker(name))
-    # These are what the whole system is compared by.
-    return replace(part, sources={}, definitions={}) if name else part
+    spec = snapshot.spec.in_worker(name)
+    if not name:
+        return replace(snapshot, spec=spec)
+    if level := spec.workers[name].log_level:
+        nodes = {
+            key: node if node.log_level else replace(node, log_level=level)
+            for key, node in spec.nodes.items()
+        }
+        spec = replace(spec, nodes=nodes)
+    # What is left out is what the whole system is compared by.
+    return replace(snapshot, spec=spec, sources={}, definitions={})

@@ -34,6 +34,7 @@ class Worker:
         request: What its process has imported, and imports when it is started again.
         next_request: What an edit has it import.
         assignment: What it runs, or is to run once it is started again.
+        has_imported: Whether its process has imported its behaviours: from then on it answers.
         is_up: Whether all its nodes have started.
         is_silent: Whether it was told that it does not answer.
     """
@@ -46,6 +47,7 @@ class Worker:
         self.request: ImportRequest | None = None
         self.next_request: ImportRequest | None = None
         self.assignment: Assignment | None = None
+        self.has_imported = False
         self.is_up = False
         self.is_silent = False
         self._supervisor = supervisor
@@ -116,6 +118,7 @@ class Worker:
         request = self.next_request
         assert request is not None  # noqa: S101 - it was made just before
         shapes = self.do('import_behaviours', request)
+        self.has_imported = True
         return dict(zip([each.name for each in request.behaviours], shapes, strict=True))
 
     def start(self) -> None:
@@ -135,7 +138,9 @@ class Worker:
         Raises:
             ComposerError: They could not start.
         """
+        self.is_up = self.has_imported = False
         self.do('import_behaviours', self.request)
+        self.has_imported = True
         self.do('keep_imports')
         self.start()
 
@@ -149,7 +154,7 @@ class Worker:
         Returns:
             The exit code, and whether all behaviours have ended.
         """
-        self.process.is_leaving = True
+        self.leave()
         if not self.is_alive:
             return ExitCode.DONE, True
         try:
@@ -169,6 +174,10 @@ class Worker:
             with suppress(ProcessLookupError):
                 os.kill(run.pid, STACKS_SIGNAL)
             run.ended.wait(_STACKS_SEC)
+
+    def leave(self) -> None:
+        """Have it not be started again."""
+        self.process.is_leaving = True
 
     def remove(self, timeout_sec: float) -> None:
         """Stop it, and have its process killed if it does not end."""

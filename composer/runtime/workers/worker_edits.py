@@ -113,7 +113,9 @@ class ReplacedWorker:
         revive: Callable[[Worker], None],
         timeout_sec: float,
     ) -> None:
-        self._old = old if old is not None and old.is_alive else None
+        self._before = old
+        # One that has ended needs no goodbye.
+        self._old = old if old is not None and old.is_alive and old.is_up else None
         self._new = new
         self._adopt = adopt
         self._revive = revive
@@ -147,6 +149,8 @@ class ReplacedWorker:
 
     def commit(self) -> None:
         """See `WorkerEdit`."""
+        if self._before is not None:
+            self._before.leave()
         self._adopt(self._new)
         if self._old is not None and self._new is None:
             with suppress(ComposerError):

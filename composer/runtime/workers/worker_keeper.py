@@ -79,8 +79,9 @@ class WorkerKeeper:
         with self._lock:
             worker = self._worker_of(process)
             if worker is None or self.is_stopping:
+                # An edit has let go of it while it was being started.
+                self.supervisor.kill(process)
                 return
-            worker.is_up = False
             self._restarting = worker
             try:
                 worker.begin_again()

@@ -19,6 +19,7 @@ from composer.processes.channel import Channel
 from composer.processes.guardian import tell
 from composer.processes.guardian_client import print_stacks_at_signal
 from composer.processes.reaper import LINK
+from composer.runtime import forked_children
 from composer.runtime.behaviours.callables import BehaviourImportError, import_behaviour
 from composer.runtime.behaviours.import_check import shape_of
 from composer.runtime.logs import log_levels
@@ -53,6 +54,7 @@ def main(name: str) -> None:
     print_stacks_at_signal()
     worker = WorkerProcess(name)
     # What a user or the kernel sends to this process alone: its nodes stop, and that is a failure.
+    forked_children.signal_handlers[signal.SIGTERM] = signal.SIG_DFL
     signal.signal(signal.SIGTERM, worker.terminate)
     worker.run()
 

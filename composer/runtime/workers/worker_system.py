@@ -41,6 +41,7 @@ class WorkerSystem(System):
     ) -> None:
         self._channel = channel
         self._worker = assignment.worker
+        self.label = f"worker '{self._worker.name}'"
         self.is_told_to_stop = False
         super().__init__(
             self.read(assignment.snapshot, functions),

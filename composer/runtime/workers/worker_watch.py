@@ -45,7 +45,7 @@ class WorkerWatch:
     def _run(self) -> None:
         while not self._ended.wait(_PERIOD_SEC):
             for worker in self._list_workers():
-                if worker.is_alive:
+                if worker.is_alive and worker.has_imported:
                     self._look(worker)
 
     def _look(self, worker: Worker) -> None:
@@ -60,11 +60,12 @@ class WorkerWatch:
                 'or a behaviour keeps the interpreter from all others; its threads are at'
             )
             worker.print_stacks()
-        if worker.is_silent and not is_silent:
-            self._log.info(f"worker '{worker.name}' answers again")
-        worker.is_silent = is_silent
+            worker.is_silent = True
 
     def _ask(self, worker: Worker) -> None:
         with suppress(ComposerError):
             worker.call('ping')
+            if worker.is_silent:
+                self._log.info(f"worker '{worker.name}' answers again")
+        worker.is_silent = False
         self._asked.pop(worker, None)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 
 import pytest
 
@@ -119,4 +120,25 @@ def test_a_running_system_tells_of_its_workers(compose, capsys, monkeypatch):
     }
     assert run(['restart', '/talker']) == 0
     assert pid_of(child, 'talker', times=2) == worker['pid']
+    assert child.stop() == 0
+
+
+def test_an_edit_takes_a_worker_that_waits_to_be_started_again(compose):
+    nodes = {'talker': node('left', *TALKS), 'far': node('right', *HEARS)}
+    slow = 'workers: {left: {restart: {delay: 3}, log_level: error}}\n'
+    child = compose(system(nodes, slow), CODE, '--watch')
+    child.wait_until_ready()
+    os.kill(pid_of(child, 'talker'), signal.SIGKILL)
+    child.wait_for_line('it is started again in')
+
+    # It comes up with the new code, and only as long as it has nodes.
+    edit(compose, child, system(nodes, slow), CODE.replace(' begins in ', ' comes up in '))
+    child.wait_for_line("worker 'left' was started again")
+    again = int(child.wait_for_line('talker comes up in').split()[-1])
+    os.kill(again, signal.SIGKILL)
+    child.wait_for_line('it is started again in', times=2)
+    edit(compose, child, system({'far': nodes['far']}), CODE)
+    edit(compose, child, system({'far': nodes['far'], 'talker': node('', *TALKS)}), CODE)
+    assert pid_of(child, 'talker', times=2) == child.pid
+    assert len(child.matching('was started again')) == 1
     assert child.stop() == 0
