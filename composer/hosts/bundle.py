@@ -16,6 +16,7 @@ from composer.hosts.requirements import (
     provide_wheels,
 )
 from composer.hosts.wheels import build_composer_wheel
+from composer.network.servers import used_hosts
 from composer.network.variables import ros_variables
 from composer.spelling import suggest
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.language.specs import HostSpec, NodeSpec, ProcessSpec, SystemSpec
+    from composer.language.specs import HostSpec, SystemSpec
 
 
 class Bundle:
@@ -101,8 +102,7 @@ def choose_hosts(spec: SystemSpec, wanted: Sequence[str] = ()) -> list[HostSpec]
             advice = suggest(name, spec.hosts, 'there are')
             message = f"'{spec.name}' has no host '{name}'"
             raise UsageError(message, help=advice)
-    parts: list[NodeSpec | ProcessSpec] = [*spec.nodes.values(), *spec.processes.values()]
-    used = {each.host for each in parts}
+    used = used_hosts(spec)
     return [
         host
         for name, host in spec.hosts.items()

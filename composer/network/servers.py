@@ -36,6 +36,16 @@ def with_servers(part: SystemSpec) -> SystemSpec:
     return replace(part, processes=MappingProxyType({name: process, **part.processes}))
 
 
+def used_hosts(spec: SystemSpec) -> set[str]:
+    """Return the hosts that something of a whole system runs on, its server included."""
+    found = {each.host for each in spec.nodes.values()}
+    found |= {each.host for each in spec.processes.values()}
+    network = spec.network
+    if network is not None and network.discovery in ('discovery_server', 'zenoh'):
+        found.add(network.server)
+    return found - {''}
+
+
 def _find_server(part: SystemSpec, network: NetworkSpec) -> tuple[str, dict[str, Any]] | None:
     if network.discovery == 'zenoh':
         router = {'package': ZENOH, 'executable': 'rmw_zenohd', 'env': router_variables(part)}

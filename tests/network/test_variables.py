@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from composer.language.pipeline import load_system
-from composer.network.servers import with_servers
+from composer.network.servers import used_hosts, with_servers
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 
 INVENTORY = {
@@ -131,6 +131,15 @@ def test_the_server_runs_on_its_host_alone_and_always_again(load):
     server = parts['base']['discovery_server']
     assert server.command[1:] == ('-m', 'composer.network.discovery_server', '9')
     assert (server.restart, server.most_restarts, server.host) == ('always', None, 'base')
+
+
+@pytest.mark.parametrize(
+    ('kind', 'expected'), [('discovery_server', {'base', 'arm'}), ('multicast', {'arm'})]
+)
+def test_a_host_with_a_server_alone_is_used(load, kind, expected):
+    processes = {'drive': {'command': ['true'], 'host': 'arm'}}
+    network = {'discovery': kind, 'server': 'base'}
+    assert used_hosts(load(network, hosts=INVENTORY, processes=processes)) == expected
 
 
 def test_each_host_has_a_router_of_zenoh_that_connects_to_the_one_of_the_server(load):
