@@ -81,3 +81,33 @@ def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
     jetson.wait_for(' ready in ')
     heard = base.count('saw')
     base.wait_for('saw', times=heard + 3)
+
+
+@takes_long
+@pytest.mark.parametrize('kind', ['peers', 'discovery_server'])
+def test_five_hosts_hear_all_others(create_hosts, kind):
+    names = ['base', 'jetson', 'arm', 'front', 'rear']
+    hosts = create_hosts(*names)
+    nodes = ''.join(
+        f"""
+      node_{name}:
+        host: {name}
+        publishers: {{said: {{type: std_msgs/msg/String, topic: /said}}}}
+        timers: {{speak: {{period: 0.5, behaviour: parts:speak, publish: said}}}}
+        subscriptions: {{heard: {{type: std_msgs/msg/String, topic: /said, behaviour: parts:hear}}}}"""
+        for name in names
+    )
+    code = """
+    def speak(node):
+        return node.name
+
+
+    def hear(node, message):
+        node.logger.info(f'heard {message.data}.')
+    """
+    hosts.write(f'\n    version: 1\n    nodes:{nodes}\n', code, discovery=kind, server='base')
+    parts = [hosts.up(name) for name in names]
+    for part in parts:
+        for name in names:
+            part.wait_for(f'heard node_{name}.')
+    assert [part.stop() for part in parts] == [0] * len(parts)
