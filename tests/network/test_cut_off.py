@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.network.test_across_hosts import CODE, SYSTEM
+from tests.network.test_discovery_kinds import CODE, SYSTEM
 from tests.network_namespaces import needs_namespaces, takes_long
 
 # With these, Fast DDS takes a participant for gone after 4 s instead of 20.
