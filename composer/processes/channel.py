@@ -73,6 +73,9 @@ class Channel:
         self._is_lost = False
         self._sending = threading.Lock()
         self._thread = threading.Thread(target=self._listen, name=f'calls of {other}', daemon=True)
+
+    def listen(self) -> None:
+        """Take the calls and answers of the other end from now on."""
         self._thread.start()
 
     def call(self, name: str, *arguments: Any, timeout_sec: float | None = None) -> Any:

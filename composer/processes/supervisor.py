@@ -237,6 +237,9 @@ class ProcessSupervisor:
 
     def _on_reaper_lost(self) -> None:
         # All that it had started was killed with it.
+        for run in list(self._runs.values()):
+            run.code = -signal.SIGKILL if run.code is None else run.code
+            run.ended.set()
         if not self._stopping.is_set():
             self._logger.error(f'the process reaper was killed, and {self._all} with it')
             self._end_system(ExitCode.FAILED)

@@ -67,6 +67,7 @@ class WorkerSupervisor(ProcessSupervisor):
         spec = process.spec
         own, other = socket.socketpair()
         process.channel = Channel(own.detach(), f"worker '{spec.name}'", process.functions)
+        process.channel.listen()
         output_ended = threading.Event()
         output_ended.set()
         descriptors = [os.dup(1), os.dup(2), other.detach()]

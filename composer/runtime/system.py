@@ -42,7 +42,7 @@ from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import find_hidden
-from composer.runtime.workers.parts import find_moved
+from composer.runtime.workers.worker_parts import find_moved
 from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:

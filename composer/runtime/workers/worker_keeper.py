@@ -76,7 +76,10 @@ class WorkerKeeper:
 
     def _begin_again(self, process: ExternalProcess) -> None:
         """Run the nodes of a worker again whose process was started again."""
+        run = process.run
         with self._lock:
+            if process.run is not run:
+                return  # It has ended, and was started again, while an edit was under way.
             worker = self._worker_of(process)
             if worker is None or self.is_stopping:
                 # An edit has let go of it while it was being started.

@@ -81,6 +81,7 @@ class WorkerProcess:
         )
         functions = {each.__name__: each for each in calls}
         self._channel = Channel(LINK, 'the process of the system', functions, self._on_lost)
+        self._channel.listen()
 
     def run(self) -> None:
         """Wait for the end, and exit with its code."""

@@ -18,11 +18,11 @@ from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.bindings import system_bindings
 from composer.runtime.workers.assignment import Assignment, ImportRequest
 from composer.runtime.workers.at_once import ANSWER_SEC, ask_all, do_at_once
-from composer.runtime.workers.parts import needs_new_process, part_of, used_workers
 from composer.runtime.workers.system_calls import SystemCalls
 from composer.runtime.workers.worker import Worker
 from composer.runtime.workers.worker_edits import ChangedWorker, ReplacedWorker
 from composer.runtime.workers.worker_keeper import KILL_SEC, WorkerKeeper
+from composer.runtime.workers.worker_parts import needs_new_process, part_of, used_workers
 from composer.runtime.workers.worker_watch import WorkerWatch
 
 if TYPE_CHECKING:

@@ -141,3 +141,16 @@ def test_workers_die_at_random_and_the_system_stays_whole(compose):
     last = pid_of(child, 'talker', times=3)
     wait_for(lambda: child.matching(f'of {last} in {pid_of(child, "far", times=3)}'), 'messages')
     assert child.stop() == 0
+
+
+@pytest.mark.parametrize(('where', 'code'), [('import', 1), ('on_start', 1)])
+def test_a_worker_without_its_descriptors_ends(compose, where, code):
+    spoil = 'os.closerange(3, 200)'
+    text = system({'home': node(''), 'bad': '{worker: left, on_start: spoils:begin}'})
+    lines = {'import': f'import os\n{spoil}\ndef begin(node): pass\n'}
+    lines['on_start'] = f'import os\ndef begin(node): {spoil}\n'
+    (compose.folder / 'spoils.py').write_text(lines[where])
+    child = compose(text, CODE)
+    assert child.wait() == code
+    assert child.matching("worker 'left' has ended with exit code 1 while it started")
+    assert not child.matching(' ready in ')
