@@ -53,19 +53,27 @@ def test_a_unit_of_somebody_else_is_not_overwritten(project):
 
 
 @pytest.mark.parametrize(
-    ('settings', 'message'),
+    'lacks',
     [
-        ('python=/nowhere/python3', "host front has no Python '/nowhere/python3'"),
-        ('python=/home/robot/old', 'Python 3.8.10, and Composer needs 3.11 or newer'),
-        ('folder=/home/robot/small', 'its disk has 21 MB'),
-        ('folder=/home/robot/narrow', 'the disk is full'),
-        ('address=10.77.9.9', 'host front (10.77.9.9) cannot be reached'),
-        ('port=23', 'host front (front) cannot be reached'),
-        ('user=nobody', 'host front (front) accepts none of our keys'),
-        ('systemd=system', 'units of the system are for root'),
+        {
+            'front.python=/nowhere/python3': "host front has no Python '/nowhere/python3'",
+            'rear.python=/home/robot/old': 'Python 3.8.10, and Composer needs 3.11 or newer',
+        },
+        {
+            'front.address=10.77.9.9': 'host front (10.77.9.9) cannot be reached',
+            'rear.port=23': 'host rear (rear) cannot be reached',
+        },
+        {
+            'front.user=nobody': 'host front (front) accepts none of our keys',
+            'rear.address=no-such-name': 'host rear (no-such-name) cannot be reached',
+        },
+        {'front.systemd=system': 'host front: units of the system are for root'},
+        {'front.folder=/home/robot/small': 'its disk has 21 MB'},
+        {'front.folder=/home/robot/narrow': 'host front: the disk is full'},
     ],
+    ids=lambda lacks: ' '.join(each.partition('=')[0] for each in lacks),
 )
-def test_what_a_host_lacks_is_said_before_anything_is_done(project, settings, message):
+def test_what_a_host_lacks_is_said_before_anything_is_done(project, lacks):
     script = """
         cd /home/robot
         mkdir -p small narrow
@@ -74,12 +82,16 @@ def test_what_a_host_lacks_is_said_before_anything_is_done(project, settings, me
         printf '#!/bin/sh\\nexec python3 -c "import sys; sys.version_info = (3, 8, 10); exec(sys.argv[1])" "$3"\\n' >old
         chmod +x old
     """
-    assert not project.front.run('sh', '-c', dedent(script), user='root').returncode
+    for host in (project.front, project.rear):
+        assert not host.run('sh', '-c', dedent(script), user='root').returncode
     before = project.states()
     (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
-    told = project.fail('--set', f'hosts.front.{settings}', system='other.yaml')
-    assert message in told
-    assert not project.front.run('sh', '-c', 'ls */*other* */*/*other*').stdout
+    told = project.fail(*[f'--set=hosts.{each}' for each in lacks], system='other.yaml')
+    assert [each for each in lacks.values() if each not in told] == []
+    for host in (project.front, project.rear):
+        assert not host.run(
+            'find', FOLDER, UNITS, '-name', '*other*', '-not', '-path', '*/locks/*'
+        ).stdout
     assert project.states() == before
     project.hears('hello')
 
