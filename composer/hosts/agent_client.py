@@ -6,6 +6,7 @@ import asyncio
 import io
 import json
 import shlex
+import time
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -42,6 +43,7 @@ main(json.loads(options))
 """
 _PING_SEC = 3.0
 _SILENCE_SEC = 15.0
+_PART = 1 << 18
 _OLDEST = [3, 11]
 _NOT_FOUND = (126, 127)
 
@@ -70,6 +72,7 @@ class HostAgent:
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._tasks: list[asyncio.Task[None]] = []
         self._count = 0
+        self._heard_sec = 0.0
 
     async def open(self, options: Mapping[str, Any]) -> None:
         """Connect, and start it.
@@ -139,6 +142,18 @@ class HostAgent:
         finally:
             self._answers.pop(number, None)
 
+    async def bring(self, operation: str, name: str, data: bytes) -> None:
+        """Bring it a file, in parts: each is answered, so a slow line is not taken for a lost one.
+
+        Args:
+            operation: What it does with the whole.
+        """
+        rest = data
+        while len(rest) > _PART:
+            await self.call('receive_part', rest[:_PART])
+            rest = rest[_PART:]
+        await self.call(operation, rest, name=name)
+
     async def close(self) -> None:
         """End the connection, and with it the agent."""
         for task in self._tasks:
@@ -160,6 +175,7 @@ class HostAgent:
         self._give_up(reason)
 
     def _take(self, answer: dict[str, Any]) -> None:
+        self._heard_sec = time.monotonic()
         waiting = self._answers.get(answer['id'])
         if waiting is None or waiting.done():
             return
@@ -175,7 +191,9 @@ class HostAgent:
             try:
                 await asyncio.wait_for(self.call('ping'), _SILENCE_SEC)
             except TimeoutError:
-                self._give_up(f'no answer within {_SILENCE_SEC:g} s')
+                # It comes after what is brought.
+                if time.monotonic() - self._heard_sec > _SILENCE_SEC:
+                    self._give_up(f'no answer within {_SILENCE_SEC:g} s')
             except ComposerError:
                 return
 
@@ -184,6 +202,8 @@ class HostAgent:
         for waiting in self._answers.values():
             if not waiting.done():
                 waiting.set_exception(self._lose(reason))
+        if self._connection is not None:
+            self._connection.abort()
 
     def _lose(self, reason: str) -> HostLostError:
         self.is_lost = True

@@ -179,13 +179,13 @@ class Deployment:
     async def _prepare(self, agent: HostAgent, plan: HostPlan) -> None:
         part, name = plan.part, agent.host.name
         for digest in plan.blobs:
-            await agent.call('receive', part.blobs[digest], name=digest)
+            await agent.bring('receive', digest, part.blobs[digest])
         if not plan.has_composer:
-            await agent.call('receive', part.composer.data, name=part.composer.name)
+            await agent.bring('receive', part.composer.name, part.composer.data)
             digest = part.manifest['composer']
             await agent.call('unpack_composer', digest=digest, wheel=part.composer.name)
         for wheel in plan.wheels:
-            await agent.call('receive_wheel', part.wheels[wheel].read_bytes(), name=wheel)
+            await agent.bring('receive_wheel', wheel, part.wheels[wheel].read_bytes())
         if part.manifest['venv'] not in self._facts[name]['venvs']:
             self._tell(f'{name}: installing {len(part.wheels)} packages')
         await agent.call(

@@ -1,5 +1,8 @@
 """Nothing is done if a host lacks something, or has what others wrote."""
 
+import os
+import signal
+import subprocess
 from textwrap import dedent
 
 import pytest
@@ -125,5 +128,28 @@ def test_keys_are_those_of_ssh(project):
         project.deploy('--host', 'front', '--set', key, '--plan')
     finally:
         (ssh / 'known_hosts').write_text(known)
+        if (ssh / 'elsewhere').exists():
+            (ssh / 'elsewhere').rename(ssh / 'id_ed25519')
+
+
+def test_jumps_and_agents_are_those_of_ssh(project):
+    ssh = project.bed.home / '.ssh'
+    config = (ssh / 'config').read_text()
+    jump = 'Host far\n  HostName 10.77.1.2\n  HostKeyAlias rear\n  ProxyJump front\n'
+    agent = project.bed.run('ssh-agent', '-c').stdout.split()
+    socket, pid = agent[2].rstrip(';'), int(agent[6].rstrip(';'))
+    words = ['deploy', '--plan', '--set', 'hosts.rear.address=far']
+    try:
+        (ssh / 'config').write_text(jump + config)
+        environment = {**project.options['env'], 'SSH_AUTH_SOCK': socket}
+        subprocess.run(['ssh-add', '-q', str(ssh / 'id_ed25519')], env=environment, check=True)
+        (ssh / 'id_ed25519').rename(ssh / 'elsewhere')
+        options = project.options | {'env': environment}
+        done = project.bed.run(*project.words(*words), **options)
+        assert done.returncode == 0, done.stderr
+        assert 'rear (far): ' in done.stdout
+    finally:
+        os.kill(pid, signal.SIGTERM)
+        (ssh / 'config').write_text(config)
         if (ssh / 'elsewhere').exists():
             (ssh / 'elsewhere').rename(ssh / 'id_ed25519')

@@ -58,6 +58,7 @@ class Conversation:
         self._operations: dict[str, Callable[..., Any]] = {
             'look': lambda: collect_facts(store, service, transaction),
             'lock': store.lock,
+            'receive_part': store.receive_part,
             'receive': store.receive,
             'receive_wheel': store.receive_wheel,
             'unpack_composer': store.unpack_composer,

@@ -60,6 +60,7 @@ class Store:
         self.live = self.root / 'live'
         self.pending = self.root / 'pending'
         self.incoming = self.root / 'incoming'
+        self._parts = bytearray()
         self._lock: TextIO | None = None
 
     def lock(self, owner: str) -> None:
@@ -75,7 +76,9 @@ class Store:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             stream.seek(0)
-            message = f"'{self.system}' is being deployed by {stream.read() or 'another'}"
+            owner = stream.read() or 'another'
+            stream.close()
+            message = f"'{self.system}' is being deployed by {owner}"
             raise HostError(message, 'wait until that has ended') from error
         stream.truncate(0)
         stream.write(f'{owner}, since {time.strftime("%H:%M:%S")}')
@@ -125,13 +128,22 @@ class Store:
         else:
             write_link(self.current, release)
 
-    def receive(self, name: str, data: bytes) -> None:
-        """Keep a file that has come, until it is staged."""
-        write_file(self.incoming / name, data)
+    def receive_part(self, data: bytes) -> None:
+        """Keep the next part of a file, until the last one comes."""
+        self._parts += data
 
-    def receive_wheel(self, name: str, data: bytes) -> None:
-        """Keep a wheel that has come, for all systems."""
-        write_file(self.folder / 'wheels' / Path(name).name, data)
+    def receive(self, name: str, data: bytes = b'') -> None:
+        """Keep a file whose last part has come, until it is staged."""
+        write_file(self.incoming / name, self._take_parts() + data)
+
+    def receive_wheel(self, name: str, data: bytes = b'') -> None:
+        """Keep a wheel whose last part has come, for all systems."""
+        write_file(self.folder / 'wheels' / Path(name).name, self._take_parts() + data)
+
+    def _take_parts(self) -> bytes:
+        taken = bytes(self._parts)
+        self._parts.clear()
+        return taken
 
     def unpack_composer(self, digest: str, wheel: str) -> None:
         """Unpack the wheel of Composer, if that has not been done."""
