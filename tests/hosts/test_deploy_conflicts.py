@@ -137,7 +137,7 @@ def test_jumps_and_agents_are_those_of_ssh(project):
     config = (ssh / 'config').read_text()
     jump = 'Host far\n  HostName 10.77.1.2\n  HostKeyAlias rear\n  ProxyJump front\n'
     agent = project.bed.run('ssh-agent', '-c').stdout.split()
-    socket, pid = agent[2].rstrip(';'), int(agent[6].rstrip(';'))
+    socket, pid = agent[2].rstrip(';'), int(agent[5].rstrip(';'))
     words = ['deploy', '--plan', '--set', 'hosts.rear.address=far']
     try:
         (ssh / 'config').write_text(jump + config)
