@@ -122,13 +122,22 @@ def wrong_type(error: ValidationError, expected: str) -> Violation:
     """Return the violation for a value of a wrong type."""
     path = path_of(error)
     empty = error.instance is None and expected == 'a mapping'
+    help_text = 'write {} for an empty mapping, or remove the key' if empty else None
     return Violation(
         'wrong-type',
         f'expected {expected}, got {show_value(error.instance)}',
         path,
         droppable(path),
-        help='write {} for an empty mapping, or remove the key' if empty else None,
+        help=help_text or _full_form(error),
     )
+
+
+def _full_form(error: ValidationError) -> str | None:
+    """Return how a lone value is written that one key of a mapping takes, if one does."""
+    for key, schema in error.schema.get('properties', {}).items():
+        if error.instance in schema.get('enum', ()):
+            return f'write {{{key}: {error.instance}}}'
+    return None
 
 
 def describe_types(types: str | list[str]) -> str:

@@ -102,6 +102,16 @@ def test_a_right_file_has_no_findings():
                 'the keys are: shutdown_timeout, threads',
             ),
         ),
+        *(
+            (
+                HEAD + text,
+                ('wrong-type', f"expected a mapping, got '{when}'", at, f'write {{when: {when}}}'),
+            )
+            for text, when, at in (
+                ('nodes: {}\nworkers: {w: {restart: never}}', 'never', '3:24'),
+                ('processes: {p: {command: [a], restart: always}}', 'always', '2:40'),
+            )
+        ),
         (HEAD + 'nodes: []', ('wrong-type', 'expected a mapping, got an empty list', '2:8', None)),
         (
             HEAD + 'nodes:\n',
