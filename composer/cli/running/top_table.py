@@ -63,6 +63,8 @@ COLUMNS = (
     Column('ERRORS', _field('errors'), str),
     Column('DELIVERY', _delivery, str),
 )
+# Only of systems with workers; an empty one is the process of the system.
+_WORKER = Column('WORKER', lambda entity: escape(entity['worker']) or None, str)
 SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
 }
@@ -139,8 +141,10 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
 
 def render_entities(entities: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the lines of the table, its header first."""
+    has_workers = any(each['worker'] for each in entities)
+    columns = (*COLUMNS, _WORKER) if has_workers else COLUMNS
     rows = [
-        ['-' if (value := each.value(entity)) is None else each.show(value) for each in COLUMNS]
+        ['-' if (value := each.value(entity)) is None else each.show(value) for each in columns]
         for entity in entities
     ]
-    return render_table([each.title for each in COLUMNS], rows)
+    return render_table([each.title for each in columns], rows)

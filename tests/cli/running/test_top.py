@@ -125,6 +125,11 @@ def test_figures_stand_to_the_right():
     )
 
 
+def test_workers_are_a_column_where_there_are_any():
+    placed = [dict(ENTITIES[0], worker='vision'), ENTITIES[1]]
+    assert [line.split()[-1] for line in render_entities(placed)] == ['WORKER', 'vision', '-']
+
+
 def process(worker='', **figures):
     waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, 'gil': 0.9, **waits, **figures}
