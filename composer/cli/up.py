@@ -15,10 +15,11 @@ from composer.cli.common.output import show_findings
 from composer.cli.common.recording_options import RecordingOptions
 from composer.cli.common.system_reader import SystemReader, import_reading
 from composer.diagnostics import has_errors
-from composer.errors import ExitCode, UsageError
+from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
+from composer.network.shared_memory import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot import take_snapshot
 from composer.processes.own_process import note_start
@@ -103,7 +104,7 @@ def up(  # noqa: PLR0913 - one for each option
     check_ros()
     from composer.cli.reload import Reloader
 
-    variables = _find_variables(context.spec)
+    variables = _find_variables(context.spec, rehearses=rehearses)
     with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)
         check_log_folder(ros_arguments)
@@ -122,16 +123,21 @@ def up(  # noqa: PLR0913 - one for each option
         )
 
 
-def _find_variables(spec: SystemSpec) -> dict[str, str]:
-    """Return the environment that a system starts in; tell which peers it cannot look for."""
+def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
+    """Return the environment that a system starts in; tell what its network lacks."""
     variables = ros_variables(spec)
-    if not (spec.host and spec.network):
+    if spec.host and spec.network:
+        variables, unknown = drop_unknown_peers(clear_others(variables, os.environ))
+        for name in unknown:
+            text = f"network: there is no address of '{name}' now: it must find this host itself"
+            click.echo(text, err=True)
+    try:
+        return {**shared_memory_variables(spec, {**os.environ, **variables}), **variables}
+    except ComposerError as error:
+        # The system that runs meanwhile has the room that this one will have.
+        if not rehearses:
+            click.echo(f'network: {error}\n  help: {error.help}', err=True)
         return variables
-    variables, unknown = drop_unknown_peers(clear_others(variables, os.environ))
-    for name in unknown:
-        text = f"network: there is no address of '{name}' now: it must find this host itself"
-        click.echo(text, err=True)
-    return variables
 
 
 def _refuse_scenario(path: Path) -> None:

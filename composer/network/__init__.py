@@ -1,1 +1,1 @@
-"""How the processes of a system find each other across hosts."""
+"""How the processes of a system find each other, and what their messages go through."""

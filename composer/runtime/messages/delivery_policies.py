@@ -13,6 +13,8 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
+from composer.network.shared_memory import PROFILE, PROFILE_VARIABLES
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,10 +23,9 @@ if TYPE_CHECKING:
 # Longer durations are no limit.
 _LONGEST_NS: Final = 2**62
 _SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
-# Each names a file that may change how Fast DDS delivers.
+# Each names a file that may change how Fast DDS delivers; Composer's own does not.
 _PROFILE_VARIABLES: Final = (
-    'FASTDDS_DEFAULT_PROFILES_FILE',
-    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    *PROFILE_VARIABLES,
     'RMW_FASTRTPS_USE_QOS_FROM_XML',
 )
 
@@ -52,7 +53,7 @@ def may_be_late(middleware: str, environment: Mapping[str, str]) -> bool:
     return (
         middleware != 'rmw_fastrtps_cpp'
         or environment.get('RMW_FASTRTPS_PUBLICATION_MODE', '') not in _SYNCHRONOUS
-        or any(environment.get(name) for name in _PROFILE_VARIABLES)
+        or any(environment.get(name, '') not in ('', PROFILE) for name in _PROFILE_VARIABLES)
     )
 
 
