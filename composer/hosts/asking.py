@@ -79,6 +79,11 @@ async def ask_all(
     return list(await asyncio.gather(*map(ask, hosts)))
 
 
+def state_command(system: str, host: HostSpec) -> str:
+    """Return the command line that prints whether the unit of a part is active."""
+    return f'{_systemctl(host)} is-active -- {shlex.quote(unit_of(system, host))}'
+
+
 def stop_command(system: str, host: HostSpec) -> str:
     """Return the command line that stops a part, and waits until it has stopped."""
     return f'{_systemctl(host)} stop -- {shlex.quote(unit_of(system, host))}'

@@ -7,6 +7,7 @@ import subprocess
 import pytest
 
 from tests.host_bed import why_there_is_none
+from tests.hosts.deployed import FOLDER
 from tests.running import wait_for
 
 pytestmark = [
@@ -31,6 +32,18 @@ def test_ps_lists_the_parts_and_says_which_host_is_not_there(project):
     assert (front['name'], front['host'], front['nodes']) == ('robot@front', 'front', ['/talker'])
     assert rear == {'name': 'robot@rear', 'state': 'unreachable'}
     assert done.stderr.startswith('error: host rear (rear) cannot be reached: ')
+
+
+def test_ps_does_not_take_a_part_that_cannot_be_asked_for_one_that_is_not_there(project):
+    script = f'{FOLDER}/systems/robot/live/composer'
+    broken = '#!/bin/sh\necho no graph >&2\nexit 1\n'
+    kept = project.front.run('cat', script).stdout
+    project.front.run('sh', '-c', f'cat >{script}', stdin=broken)
+    done = project.run('ps')
+    project.front.run('sh', '-c', f'cat >{script}', stdin=kept)
+    assert done.returncode == 1
+    assert 'robot@front  no answer' in done.stdout
+    assert done.stderr == 'error: host front: the part runs, and does not answer\nno graph\n'
 
 
 def test_top_shows_the_entities_of_all_parts(project):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -25,6 +26,7 @@ from composer.hosts.asking import (
     ask_composer,
     follow_all,
     log_command,
+    state_command,
     stop_command,
 )
 from composer.hosts.bundle import choose_hosts
@@ -38,6 +40,10 @@ if TYPE_CHECKING:
     from composer.language.specs import HostSpec
 
 _STOP_SEC = 60.0
+_STATE_SEC = 10.0
+_NOT_RUNNING = 'not running'
+# As systemd names them.
+_RUNNING_STATES = ('active', 'reloading')
 
 
 def ps_across(words: Sequence[str], *, format_name: str) -> int:
@@ -45,9 +51,32 @@ def ps_across(words: Sequence[str], *, format_name: str) -> int:
     system, hosts = _read(words)
     replies = asyncio.run(ask_composer(system, hosts, 'ps', '--format=json'))
     parts = [_part(system, each) for each in replies]
+    silent = _find_silent(system, replies, parts)
+    parts = [
+        replace(part, problem='no answer') if reply in silent else part
+        for part, reply in zip(parts, replies, strict=True)
+    ]
     print_systems(parts, format_name=format_name)
     _tell_unreachable(replies)
-    return _code(replies)
+    for each in silent:
+        text = f'error: host {escape(each.host.name)}: the part runs, and does not answer'
+        click.echo(text, err=True)
+        click.echo(escape_each(each.error), nl=False, err=True)
+    return ExitCode.FAILED if silent else _code(replies)
+
+
+def _find_silent(
+    system: str, replies: Sequence[Reply], parts: Sequence[RunningSystem]
+) -> list[Reply]:
+    """Return those of parts that are not on the graph, and whose units are active."""
+    found = {
+        reply.host.name: reply
+        for reply, part in zip(replies, parts, strict=True)
+        if part.problem == _NOT_RUNNING
+    }
+    hosts = [each.host for each in found.values()]
+    states = asyncio.run(ask_all(hosts, lambda host: state_command(system, host), _STATE_SEC))
+    return [found[each.host.name] for each in states if each.output.strip() in _RUNNING_STATES]
 
 
 def _part(system: str, reply: Reply) -> RunningSystem:
@@ -60,7 +89,7 @@ def _part(system: str, reply: Reply) -> RunningSystem:
         (told,) = answer_forms.read_answer(reply.output)['systems']
         status = answer_forms.read_answer(json.dumps({'version': 1, **told}), answer_forms.STATUS)
         return RunningSystem(name, '', status)
-    return RunningSystem(name, '', None, 'not running')
+    return RunningSystem(name, '', None, _NOT_RUNNING)
 
 
 def top_across(words: Sequence[str], view: View, *, format_name: str) -> int:

@@ -9,9 +9,15 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError, RosNotFoundError
+from composer.network.variables import PEERS, drop_unknown_peers
 from composer.records import record
 from composer.runtime.control import protocol
-from composer.runtime.environment import check_middleware, check_ros, check_shell
+from composer.runtime.environment import (
+    check_middleware,
+    check_ros,
+    check_shell,
+    environment_set,
+)
 from composer.runtime.health.system_state import Outcome
 
 if TYPE_CHECKING:
@@ -59,7 +65,11 @@ class Client:
         if importlib.util.find_spec('std_srvs') is None:
             message = 'systems are asked by the services of std_srvs, which is not installed'
             raise RosNotFoundError(message)
-        check_shell({})
+        # As a system does that it may ask, which runs without the peers that are not known.
+        peers = {PEERS: os.environ[PEERS]} if PEERS in os.environ else {}
+        self._variables, _ = drop_unknown_peers(peers)
+        with environment_set(self._variables):
+            check_shell({})
         check_middleware(os.environ)
         self._exit = ExitStack()
 
@@ -69,6 +79,7 @@ class Client:
         from rclpy.node import Node
         from rclpy.parameter import Parameter
 
+        self._exit.enter_context(environment_set(self._variables))
         context = Context()
         # No log file: it logs nothing.
         context.init([], initialize_logging=False)

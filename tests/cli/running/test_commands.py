@@ -51,7 +51,7 @@ def composer(capsys, monkeypatch, domain_id):
     return call
 
 
-def test_a_running_system_answers(compose, composer, wait_for):
+def test_a_running_system_answers(compose, composer, monkeypatch):
     """Ask it all, in the order in which a user might."""
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
@@ -65,7 +65,10 @@ def test_a_running_system_answers(compose, composer, wait_for):
     assert row.startswith('system  running  ')
     assert row.split()[-3:] == [socket.gethostname(), str(child.pid), str(path)]
 
+    # As on a host that cannot look up the others now.
+    monkeypatch.setenv('ROS_STATIC_PEERS', 'no-such-host.invalid;127.0.0.1')
     code, output, _ = composer('ps', '--format', 'json')
+    monkeypatch.delenv('ROS_STATIC_PEERS')
     (told,) = json.loads(output)['systems']
     assert told['nodes'] == ['/robot/arm', '/stuck']
     assert told['last_reload'] is None
