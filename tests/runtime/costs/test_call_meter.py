@@ -96,31 +96,38 @@ def shares_of(meter, *functions):
     return [sum(held_ns for _, held_ns in mine) / elapsed_ns for mine in laps]
 
 
+def wait_for_shares(meter, functions, hold):
+    """Measure until it is as it must be: on a crowded machine, half a second may mislead."""
+    wait_until(lambda: hold(*shares_of(meter, *functions)), 'such shares')
+
+
 @pytest.mark.parametrize('name', WORK)
 def test_two_that_do_the_same_hold_the_interpreter_all_the_time_or_hardly(name):
     function, lets_go = WORK[name]
+
+    def hold(first, second):
+        return first + second < 0.4 if lets_go else first + second > 0.7
+
     with measuring() as meter:
-        shares = shares_of(meter, function, function)
-    if lets_go:
-        assert sum(shares) < 0.4
-    else:
-        assert sum(shares) > 0.7
+        wait_for_shares(meter, (function, function), hold)
 
 
 @pytest.mark.parametrize('name', [name for name, (_, lets_go) in WORK.items() if lets_go])
 def test_beside_a_loop_it_is_the_loop_that_holds_it(name):
     with measuring() as meter:
-        loops, other = shares_of(meter, loop, WORK[name][0])
+        wait_for_shares(
+            meter, (loop, WORK[name][0]), lambda loops, other: loops > 0.5 and other < 0.25
+        )
         waits = meter.take_waits()
-    assert loops > 0.5
-    assert other < 0.25
     assert waits.mean_ms > 0.2
 
 
 def test_what_is_written_to_files_is_written_without_it(tmp_path):
+    def write():
+        write_file(tmp_path)
+
     with measuring() as meter:
-        shares = shares_of(meter, lambda: write_file(tmp_path), lambda: write_file(tmp_path))
-    assert sum(shares) < 0.5
+        wait_for_shares(meter, (write, write), lambda first, second: first + second < 0.5)
 
 
 def test_a_call_that_does_not_end_is_measured_from_outside():
