@@ -19,7 +19,7 @@ from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
-from composer.network.shared_memory import shared_memory_variables
+from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot import take_snapshot
 from composer.processes.own_process import note_start

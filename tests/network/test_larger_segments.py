@@ -9,7 +9,7 @@ import yaml
 
 from composer.errors import ComposerError
 from composer.language.pipeline import load_system
-from composer.network.shared_memory import (
+from composer.network.transport_profile import (
     PROFILE,
     PROFILE_VARIABLES,
     SEGMENT_BYTES,

@@ -13,7 +13,7 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 
-from composer.network.shared_memory import PROFILE, PROFILE_VARIABLES
+from composer.network.transport_profile import PROFILE, PROFILE_VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
