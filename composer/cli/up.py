@@ -19,6 +19,7 @@ from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
+from composer.network.local_networks import wait_for_network
 from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot import take_snapshot
@@ -104,6 +105,8 @@ def up(  # noqa: PLR0913 - one for each option
     check_ros()
     from composer.cli.reload import Reloader
 
+    if not rehearses:
+        wait_for_network(context.spec, lambda text: click.echo(text, err=True))
     variables = _find_variables(context.spec, rehearses=rehearses)
     with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)

@@ -54,3 +54,16 @@ def test_a_host_is_found_again_with_the_usual_leases(create_hosts, network, how)
     hosts = create_hosts('base', 'jetson')
     hosts.write(SYSTEM, CODE, **network)
     check_return(hosts, how)
+
+
+def test_a_part_that_starts_without_a_network_waits_for_it(create_hosts):
+    hosts = create_hosts('base', 'jetson')
+    hosts.write(SYSTEM, CODE, discovery='peers')
+    hosts['jetson'].take_down()
+    base, jetson = hosts.up('base'), hosts.up('jetson')
+    jetson.wait_for('network: no interface is up; the start waits for one')
+    assert not jetson.count(' ready in ')
+    hosts['jetson'].bring_up()
+    base.wait_for('saw', times=3)
+    for part in (base, jetson):
+        assert part.stop() == 0

@@ -1,0 +1,60 @@
+"""Whether this computer is on a network.
+
+Fast DDS looks for interfaces when a process starts, and uses no others later: a part of a system
+that starts while its cable is out would never find the other hosts. So it waits a while.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import socket
+import struct
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.specs import SystemSpec
+
+# `SIOCGIFFLAGS` and flags of `netdevice(7)`.
+_GET_FLAGS = 0x8913
+_LOOPBACK, _RUNNING = 0x8, 0x40
+_REQUEST = struct.Struct('16sH14x')
+_LONGEST_SEC = 40.0
+_POLL_SEC = 0.25
+
+
+def wait_for_network(spec: SystemSpec, tell: Callable[[str], object]) -> None:
+    """Wait until the part of a host can reach the others, as far as this computer knows.
+
+    Args:
+        tell: Takes what is waited for, and that it did not come.
+    """
+    if not spec.host or len(spec.hosts) < 2 or is_on_network():  # noqa: PLR2004 - it and another
+        return
+    tell(f'network: no interface is up; the start waits for one, {_LONGEST_SEC:g} s at most')
+    deadline = monotonic() + _LONGEST_SEC
+    while not is_on_network():
+        if monotonic() > deadline:
+            tell(
+                'network: the system starts without one, and finds no other host '
+                'until it is started again'
+            )
+            return
+        sleep(_POLL_SEC)
+
+
+def is_on_network() -> bool:
+    """Return whether an interface runs, beside that to this computer itself."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        return any(_runs(any_socket, name) for _, name in socket.if_nameindex())
+
+
+def _runs(any_socket: socket.socket, name: str) -> bool:
+    request = _REQUEST.pack(name.encode(), 0)
+    try:
+        _, flags = _REQUEST.unpack(fcntl.ioctl(any_socket, _GET_FLAGS, request))
+    except OSError:
+        return False  # It has just gone.
+    return bool(flags & _RUNNING) and not flags & _LOOPBACK
