@@ -46,6 +46,9 @@ _SILENCE_SEC = 15.0
 _PART = 1 << 18
 _OLDEST = [3, 11]
 _NOT_FOUND = (126, 127)
+# What has printed something in place of Python's version may be waiting for more.
+_END_SEC = 1.0
+_MOST_SAID = 500
 
 
 class HostLostError(ComposerError):
@@ -87,10 +90,13 @@ class HostAgent:
         python = self.host.python
         quoted = python if python.startswith('~/') else shlex.quote(python)
         command = f'exec {quoted} -I -c {shlex.quote(_BOOTSTRAP)}'
-        self._process = await self._connection.create_process(command, encoding=None)
-        await self._check_python()
-        code, told = _agent_archive(), json.dumps(dict(options)).encode()
-        self._process.stdin.write(f'{len(code):10}{len(told):10}'.encode() + code + told)
+        try:
+            self._process = await self._connection.create_process(command, encoding=None)
+            await self._check_python()
+            code, told = _agent_archive(), json.dumps(dict(options)).encode()
+            self._process.stdin.write(f'{len(code):10}{len(told):10}'.encode() + code + told)
+        except (OSError, import_asyncssh().Error) as error:
+            raise self._lose(str(error)) from error
         self._tasks = [asyncio.create_task(self._read()), asyncio.create_task(self._ping())]
 
     async def _check_python(self) -> None:
@@ -99,16 +105,9 @@ class HostAgent:
         except TimeoutError as error:
             msg = 'its Python does not answer'
             raise self._lose(msg) from error
-        if not line:
-            done = await self._process.wait()
-            text = (done.stderr or b'').decode(errors='replace').strip()
-            if done.exit_status in _NOT_FOUND:
-                message = f"host {self.host.name} has no Python '{self.host.python}'"
-                advice = "install Python 3.11 or newer there, or name it by 'python:'"
-                raise HostRefusedError(message, help=advice)
-            message = f'host {self.host.name}: the login runs no commands: {text}'
-            raise HostRefusedError(message)
-        version = json.loads(line)
+        version = _read_version(line)
+        if not version:
+            raise await self._explain_answer(line)
         if version[:2] < _OLDEST:
             found = '.'.join(map(str, version))
             message = (
@@ -116,6 +115,28 @@ class HostAgent:
                 'and Composer needs 3.11 or newer'
             )
             raise HostRefusedError(message, help="name a newer one by 'python:'")
+
+    async def _explain_answer(self, line: bytes) -> HostRefusedError:
+        """Return why what a host has answered at first is not that of its Python."""
+        host, python = self.host.name, self.host.python
+        said, code = line, None
+        with suppress(TimeoutError):
+            done = await asyncio.wait_for(self._process.wait(), _END_SEC if line else _SILENCE_SEC)
+            said, code = line + (done.stdout or b'') + (done.stderr or b''), done.exit_status
+        if code in _NOT_FOUND and not line:
+            advice = "install Python 3.11 or newer there, or name it by 'python:'"
+            return HostRefusedError(f"host {host} has no Python '{python}'", help=advice)
+        text = said.decode(errors='replace').strip()[:_MOST_SAID] or 'nothing'
+        ended = '' if code is None else f' (exit code {code})'
+        message = (
+            f"host {host}: the login ran '{python}' to run Composer, which did not answer as "
+            f'Python does. It printed: {text}{ended}'
+        )
+        advice = (
+            'a login must run commands, and print nothing of its own (as in ~/.bashrc); '
+            "'python:' names a Python of 3.11 or newer"
+        )
+        return HostRefusedError(message, help=advice)
 
     async def call(self, operation: str, data: bytes = b'', **words: Any) -> Any:
         """Let it do something; return what comes of it.
@@ -170,6 +191,8 @@ class HostAgent:
         try:
             while line := await self._process.stdout.readline():
                 self._take(json.loads(line))
+        except (ValueError, KeyError, TypeError):
+            reason = f'it answered {line[:_MOST_SAID].decode(errors="replace")!r}'
         except (OSError, import_asyncssh().Error) as error:
             reason = str(error) or reason
         self._give_up(reason)
@@ -208,6 +231,15 @@ class HostAgent:
     def _lose(self, reason: str) -> HostLostError:
         self.is_lost = True
         return HostLostError(f'host {self.host.name} was lost: {reason}')
+
+
+def _read_version(line: bytes) -> list[int]:
+    """Return the version that a Python has told; empty for anything else."""
+    with suppress(ValueError):
+        told = json.loads(line)
+        if isinstance(told, list) and all(isinstance(each, int) for each in told):
+            return told
+    return []
 
 
 def _agent_archive() -> bytes:
