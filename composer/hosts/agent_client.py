@@ -76,6 +76,7 @@ class HostAgent:
         self._tasks: list[asyncio.Task[None]] = []
         self._count = 0
         self._heard_sec = 0.0
+        self._reason = 'the connection has ended'
 
     async def open(self, options: Mapping[str, Any]) -> None:
         """Connect, and start it.
@@ -146,8 +147,7 @@ class HostAgent:
             HostLostError: It does not answer any more.
         """
         if self.is_lost:
-            msg = 'the connection has ended'
-            raise self._lose(msg)
+            raise self._lose(self._reason)
         self._count += 1
         number = self._count
         request = {'id': number, 'do': operation, **words}
@@ -187,7 +187,7 @@ class HostAgent:
             self._connection.abort() if self.is_lost else self._connection.close()
 
     async def _read(self) -> None:
-        reason = 'the connection has ended'
+        reason = self._reason
         try:
             while line := await self._process.stdout.readline():
                 self._take(json.loads(line))
@@ -221,7 +221,7 @@ class HostAgent:
                 return
 
     def _give_up(self, reason: str) -> None:
-        self.is_lost = True
+        self.is_lost, self._reason = True, reason
         for waiting in self._answers.values():
             if not waiting.done():
                 waiting.set_exception(self._lose(reason))
