@@ -1,8 +1,8 @@
 """Shared memory of Fast DDS that processes left which were killed.
 
-Each process has a segment of half a megabyte, and beside it a file that it keeps locked, by
-`flock`, for as long as it lives. A port of shared memory is left too, but the next process with
-its number takes it over.
+Each process has a segment of half a megabyte, or of 16 with workers, and beside it a file that it
+keeps locked, by `flock`, for as long as it lives. A port of shared memory is left too, but the
+next process with its number takes it over.
 Source: RobustExclusiveLock.hpp and SharedMemManager.hpp of Fast DDS 2 and 3
 """
 

@@ -14,7 +14,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.language.specs import QosSpec
-from composer.runtime.messages.delivery_policies import why_sent
+from composer.network.transport_profile import PROFILE, PROFILE_VARIABLES
+from composer.runtime.messages.delivery_policies import may_be_late, why_sent
 from composer.runtime.messages.qos_profiles import create_qos_profile
 from tests.runtime.messages.outsider import Outsider
 from tests.runtime.messages.player import play
@@ -141,3 +142,17 @@ if __name__ == '__main__':
             except AssertionError as error:
                 print(number, 'FAILED', error, flush=True)
     peer.close()
+
+
+@pytest.mark.parametrize(
+    ('environment', 'expected'),
+    [
+        ({}, False),
+        (dict.fromkeys(PROFILE_VARIABLES, PROFILE), False),
+        ({'FASTRTPS_DEFAULT_PROFILES_FILE': 'my.xml'}, True),
+        ({'FASTDDS_DEFAULT_PROFILES_FILE': 'my.xml'}, True),
+        ({'RMW_FASTRTPS_PUBLICATION_MODE': 'ASYNCHRONOUS'}, True),
+    ],
+)
+def test_a_message_may_be_late_with_profiles_of_users_alone(environment, expected):
+    assert may_be_late('rmw_fastrtps_cpp', environment) is expected
