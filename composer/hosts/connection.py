@@ -46,13 +46,18 @@ async def connect(host: HostSpec) -> asyncssh_types.SSHClientConnection:
         raise await _explain_host_key(host, error) from error
     except asyncssh.PermissionDenied as error:
         message = f'host {host.name} ({host.address}) accepts none of our keys'
-        advice = f"'ssh {_login(host)}' must work without a password: ssh-copy-id brings a key"
+        advice = (
+            f"'ssh {_login(host)}' must work without a password: ssh-copy-id brings a key; "
+            'one with a passphrase must be in the agent (ssh-add)'
+        )
         raise HostConnectionError(message, help=advice) from error
     except (OSError, asyncssh.Error, TimeoutError) as error:
-        raise _unreachable(host, error) from error
+        found = _explain_keys(host) if host.identity_file else None
+        raise found or _unreachable(host, error) from error
     except ValueError as error:
         message = f'host {host.name} ({host.address}): {error}'
-        raise HostConnectionError(message, help='see ~/.ssh/config') from error
+        unknown = HostConnectionError(message, help='see ~/.ssh/config')
+        raise _explain_keys(host) or unknown from error
     return connection
 
 
@@ -82,7 +87,28 @@ def _options(host: HostSpec) -> dict[str, Any]:
         options['username'] = host.user
     if host.identity_file:
         options['client_keys'] = [str(Path(host.identity_file).expanduser())]
+        # The agent may have it, as that of keys in ~/.ssh/config.
+        options['ignore_encrypted'] = True
     return options
+
+
+def _explain_keys(host: HostSpec) -> HostConnectionError | None:
+    """Return which of our files of keys cannot be used; `None` if all can."""
+    given = host.identity_file
+    folder = Path.home() / '.ssh'
+    paths = [Path(given).expanduser()] if given else sorted(folder.glob('id_*'))
+    for path in paths:
+        if not given and path.suffix == '.pub':
+            continue
+        try:
+            import_asyncssh().load_keypairs([str(path)], ignore_encrypted=True)
+        except (OSError, ValueError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error
+            message = f"host {host.name}: the key '{path}' cannot be used: {reason}"
+            if isinstance(error, ValueError) and path.with_name(f'{path.name}.pub').exists():
+                return HostConnectionError(message, help=f"is '{path}.pub' that of another key?")
+            return HostConnectionError(message)
+    return None
 
 
 async def _explain_host_key(host: HostSpec, error: Exception) -> HostConnectionError:

@@ -132,6 +132,12 @@ def test_keys_are_those_of_ssh(project):
         assert 'accepts none of our keys' in project.fail('--host', 'front')
         key = f'hosts.front.identity_file={ssh / "elsewhere"}'
         project.deploy('--host', 'front', '--set', key, '--plan')
+        (ssh / 'elsewhere.pub').write_text(rear)
+        told = project.fail('--host', 'front', '--set', key, '--plan')
+        assert f"the key '{ssh}/elsewhere' cannot be used: Public key mismatch" in told
+        (ssh / 'elsewhere.pub').unlink()
+        told = project.fail('--host', 'front', '--set', f'{key}s', '--plan')
+        assert f"host front: the key '{ssh}/elsewheres' cannot be used: No such file" in told
     finally:
         (ssh / 'known_hosts').write_text(known)
         if (ssh / 'elsewhere').exists():
@@ -149,7 +155,13 @@ def test_jumps_and_agents_are_those_of_ssh(project):
         (ssh / 'config').write_text(jump + config)
         environment = {**project.options['env'], 'SSH_AUTH_SOCK': socket}
         subprocess.run(['ssh-add', '-q', str(ssh / 'id_ed25519')], env=environment, check=True)
+        # A key with a passphrase is the agent's, also when it is named.
         (ssh / 'id_ed25519').rename(ssh / 'elsewhere')
+        locked = ssh / 'locked'
+        locked.write_bytes((ssh / 'elsewhere').read_bytes())
+        locked.chmod(0o600)
+        project.bed.run('ssh-keygen', '-q', '-p', '-N', 'secret', '-f', str(locked))
+        words += ['--set', f'hosts.rear.identity_file={locked}']
         options = project.options | {'env': environment}
         done = project.bed.run(*project.words(*words), **options)
         assert done.returncode == 0, done.stderr
