@@ -13,6 +13,7 @@ from composer.hosts.agent_client import HostAgent
 from composer.hosts.clock_skew import describe_skew, measure_skew
 from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host
+from composer.hosts.moves import order_changes, settle_exchanges
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
@@ -126,7 +127,9 @@ class Deployment:
 
     def plan(self, parts: Mapping[str, Part]) -> list[HostPlan]:
         """Return what is to be done on each host."""
-        return [plan_host(parts[name], facts) for name, facts in self._facts.items()]
+        return settle_exchanges(
+            [plan_host(parts[name], facts) for name, facts in self._facts.items()]
+        )
 
     def check(self, plans: Sequence[HostPlan]) -> None:
         """Check that nothing stands against the plans.
@@ -155,6 +158,10 @@ class Deployment:
         """
         changed = {each.part.host.name: each for each in plans if each.action != 'nothing'}
         agents = [self._agents[name] for name in changed]
+        groups = [
+            [self._agents[each.part.host.name] for each in group]
+            for group in order_changes(list(changed.values()))
+        ]
 
         async def each(step: Callable[[HostAgent, HostPlan], Awaitable[_ResultT]]) -> None:
             await self._each(lambda agent: step(agent, changed[agent.host.name]), agents)
@@ -162,13 +169,16 @@ class Deployment:
         try:
             await each(self._prepare)
             await each(lambda agent, _: agent.call('begin'))
-            await each(self._switch)
+            for group in groups:
+                await self._each(
+                    lambda agent: self._switch(agent, changed[agent.host.name]), group
+                )
             await each(self._hold)
             await each(self._let_go)
             await each(self._wait_until_up)
             await each(lambda agent, _: agent.call('confirm'))
         except BaseException as error:
-            told = await asyncio.shield(self._roll_back(agents))
+            told = await asyncio.shield(self._roll_back(groups[::-1]))
             if not isinstance(error, ComposerError):
                 for line in told:
                     self._tell(line)
@@ -225,8 +235,8 @@ class Deployment:
             await agent.call('wait_until_up', timeout_sec=_UP_SEC)
             self._tell(f'{agent.host.name}: up')
 
-    async def _roll_back(self, agents: Iterable[HostAgent]) -> list[str]:
-        """Take back what was done; return what became of each host."""
+    async def _roll_back(self, groups: Iterable[Iterable[HostAgent]]) -> list[str]:
+        """Take back what was done, a group after the other; return what became of each host."""
 
         async def roll_back(agent: HostAgent) -> str:
             name = agent.host.name
@@ -238,7 +248,8 @@ class Deployment:
             except ComposerError as error:
                 return lost if agent.is_lost else f'{error}'
 
-        return list(await asyncio.gather(*map(roll_back, agents)))
+        told = [await asyncio.gather(*map(roll_back, group)) for group in groups]
+        return [line for lines in told for line in lines]
 
     async def _commit(self, agents: Iterable[HostAgent]) -> None:
         found = await asyncio.gather(

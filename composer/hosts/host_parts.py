@@ -150,6 +150,7 @@ def build_part(sources: PartSources, facts: Mapping[str, Any]) -> Part:
         'packages': required,
         'composer': composer,
         'interfaces': sorted(spec.interfaces),
+        'runs': sorted([*spec.nodes, *(f'process {each}' for each in spec.processes)]),
         'unit_digest': hashlib.sha256(unit.encode()).hexdigest(),
     }
     return Part(

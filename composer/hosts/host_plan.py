@@ -34,6 +34,8 @@ class HostPlan:
         has_composer: Whether it has this Composer.
         needed_bytes: What it takes on the disk.
         conflicts: What must not be overwritten, as `path: why`.
+        leaving: The nodes and processes that the host runs, and is not to run any more.
+        coming: Those that it is to run, and does not run yet.
     """
 
     part: Part
@@ -45,6 +47,8 @@ class HostPlan:
     has_composer: bool
     needed_bytes: int
     conflicts: tuple[str, ...]
+    leaving: frozenset[str]
+    coming: frozenset[str]
 
     @property
     def transferred_bytes(self) -> int:
@@ -71,6 +75,7 @@ def plan_host(part: Part, facts: Mapping[str, Any]) -> HostPlan:
     wheels = () if has_venv else tuple(each for each in part.wheels if each not in facts['wheels'])
     action, reason = _decide(old, part, facts, has_changes=bool(changes))
     has_composer = new['composer'] in facts['composers']
+    runs, is_to_run = frozenset(old.get('runs', ())), frozenset(new['runs'])
     return HostPlan(
         part=part,
         changes=tuple(changes),
@@ -81,6 +86,8 @@ def plan_host(part: Part, facts: Mapping[str, Any]) -> HostPlan:
         has_composer=has_composer,
         needed_bytes=_count_bytes(part, wheels, has_composer=has_composer, has_venv=has_venv),
         conflicts=tuple(_find_conflicts(part, facts)),
+        leaving=runs - is_to_run,
+        coming=is_to_run - runs,
     )
 
 

@@ -63,6 +63,15 @@ def test_a_clock_that_differs_is_told(project):
     assert 'warning: the clock of host rear is 200 ms ahead of the one here' in done.stderr
 
 
+def test_a_node_that_moves_leaves_the_one_host_before_it_comes_to_the_other(project):
+    pids = project.pids()
+    project.edit('robot.yaml', 'host: rear', 'host: front')
+    project.edit('robot.yaml', 'nodes:', 'nodes:\n  spare: {host: rear}')
+    lines = project.deploy().stderr.splitlines()
+    assert [each.partition(':')[0] for each in lines if 'reloaded' in each] == ['rear', 'front']
+    assert project.pids() == pids
+
+
 def test_the_system_survives_a_boot(project):
     release = release_of(project)
     project.front.kill()

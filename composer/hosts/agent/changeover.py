@@ -160,11 +160,13 @@ class Transaction:
             if read_link(self._store.current) is None:
                 self._store.remove()
             return 'nothing was changed'
-        if self._reloads and self._service.is_active():
+        has_changed = read_link(self._store.current) != before['release']
+        if self._service.is_active() and (self._reloads or not has_changed):
             self._go_back_to(before)
             manifest = self._store.manifest() or {}
             with suppress(HostError):
-                self._reload(str(manifest.get('part')), _OLD_START_SEC)
+                if has_changed:
+                    self._reload(str(manifest.get('part')), _OLD_START_SEC)
         else:
             self._service.stop()
             self.hold.unlink(missing_ok=True)
