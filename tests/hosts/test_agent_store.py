@@ -79,3 +79,16 @@ def test_a_second_deployment_is_told_whose_the_first_one_is(store, tmp_path):
     with pytest.raises(HostError, match="'robot' is being deployed by ann@laptop, since "):
         Store(str(tmp_path), 'robot').lock('bob@desk')
     store._lock.close()
+
+
+def test_what_others_have_put_there_is_kept(store):
+    deploy(store, {'a': b'1', 'folder/b': b'2'})
+    foreign = ('live/folder/mine', 'map', 'maps/one')
+    for name in (*foreign, 'live/__pycache__/a.pyc'):
+        (store.root / name).parent.mkdir(parents=True, exist_ok=True)
+        (store.root / name).write_bytes(name.encode())
+    edited = store.folder / 'edited/robot'
+    assert store.keep_others() == [edited / name for name in ('folder/mine', 'map', 'maps/one')]
+    store.remove()
+    kept = {path.read_bytes().decode() for path in edited.rglob('*') if path.is_file()}
+    assert kept == {*foreign}

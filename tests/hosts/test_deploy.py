@@ -84,8 +84,10 @@ def test_what_is_removed_leaves_nothing_but_what_others_wrote(project):
     Path(project.folder / 'keep').touch()
     live = f'{FOLDER}/systems/robot/live/files'
     project.rear.run('sed', '-i', '1i # mine', f'{live}/robot.yaml')
+    project.rear.run('touch', f'{FOLDER}/systems/robot/map')
     done = project.run('deploy', '--remove')
     assert not done.returncode, done.stderr
+    assert not project.rear.run('ls', f'{FOLDER}/edited/robot/map').returncode
     kept = f'{FOLDER}/edited/robot/files/robot.yaml'
     assert f'rear: {kept} was edited there, and is kept' in done.stderr
     assert project.rear.run('head', '-n1', kept).stdout == '# mine\n'

@@ -206,7 +206,7 @@ class Transaction:
         self._service.reread()
 
     def remove(self) -> list[str]:
-        """Stop the system and remove what was written for it; return what is left, as edited."""
+        """Stop the system and remove what was written for it; return what is left."""
         manifest = self._store.manifest() or {}
         left = []
         if self._service.read() is not None:
@@ -222,6 +222,7 @@ class Transaction:
             kept = self._store.folder / 'edited' / self._store.system / name
             write_file(kept, (self._store.live / name).read_bytes())
             left.append(str(kept))
+        left += map(str, self._store.keep_others())
         self._store.remove()
         remove_empty(self.hold.parent)
         return left

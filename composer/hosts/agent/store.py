@@ -40,6 +40,8 @@ from composer.hosts.agent.host_errors import HostError, run
 _KEPT = 2
 _NEW_SEC = 3600.0
 _MANIFEST = 'manifest.json'
+# What of the folder of a system is not of others.
+_BROUGHT = ('releases', 'current', 'pending', 'incoming', 'start', 'before.json')
 
 
 class Store:
@@ -108,6 +110,23 @@ class Store:
             for name, found in now.items()
             if found is not None and found != given[name]
         }
+
+    def keep_others(self) -> list[Path]:
+        """Move what others have written beside what was brought to `edited`; return where to."""
+        own = _list_digests(self.manifest())
+        kept = []
+        for path in sorted(self.root.rglob('*')):
+            top, *inner = path.relative_to(self.root).parts
+            is_live = top == self.live.name
+            name = '/'.join(inner if is_live else (top, *inner))
+            is_brought = top in _BROUGHT or (is_live and name in own)
+            if is_brought or path.is_dir() or '__pycache__' in inner:
+                continue
+            target = self.folder / 'edited' / self.system / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.rename(target)
+            kept.append(target)
+        return kept
 
     def choose(self, release: str | None) -> None:
         """Let a release be the current one, and its files those that run; `None` for no release.
