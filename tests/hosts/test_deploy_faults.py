@@ -19,7 +19,7 @@ pytestmark = [
 def test_if_one_host_cannot_start_all_go_back(project):
     release = release_of(project)
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
-    project.edit('robot.yaml', 'domain_id: 120', 'domain_id: 121')
+    project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 21')
     told = project.fail()
     assert 'error: host rear: the system did not start' in told
     assert 'no sensor' in told
@@ -30,7 +30,7 @@ def test_if_one_host_cannot_start_all_go_back(project):
 
 def test_a_first_deployment_that_fails_leaves_nothing(project):
     (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
-    project.edit('other.yaml', 'domain_id: 120', 'domain_id: 122')
+    project.edit('other.yaml', 'domain_id: 20', 'domain_id: 22')
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
     told = project.fail(system='other.yaml')
     assert '  front: all of it was removed again' in told
@@ -45,7 +45,7 @@ def starting(project):
     waits = 'import time\n    while not Path.home().joinpath("go").exists(): time.sleep(0.1)'
     project.edit('behaviours/counting.py', 'def', 'from pathlib import Path\n\n\ndef')
     project.edit('behaviours/counting.py', 'pass', waits)
-    project.edit('robot.yaml', 'domain_id: 120', 'domain_id: 123')
+    project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 23')
     process = project.begin()
     wait_for(
         lambda: project.state('front')[0][:1] == ('active',) and project.state('front')[0][3],

@@ -316,7 +316,30 @@ _OF_DECLARED_NODES = (
 )
 _DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
+_OF_WORKERS = (
+    *('description', 'foreach', 'when', 'cpus', 'nice', 'threads', 'environment', 'restart'),
+    *('required', 'host', 'log_level'),
+)
+_OF_HOSTS = (
+    *('description', 'foreach', 'when', 'address', 'user', 'port', 'python', 'identity_file'),
+    *('folder', 'systemd'),
+)
+_IN_WORKERS = (
+    'tests/runtime/workers/test_workers_are_edited.py edits workers: others cannot see in'
+)
+_ELSEWHERE = 'where all runs on one computer, it changes nothing that runs'
 LEFT_OUT: dict[str, str] = {
+    **dict.fromkeys(
+        ('system.workers', 'node.worker', 'include.worker', 'defaults.worker'), _IN_WORKERS
+    ),
+    **{f'worker.{key}': _IN_WORKERS for key in _OF_WORKERS},
+    **{f'{each}.host': _ELSEWHERE for each in ('node', 'process', 'container', 'include')},
+    **dict.fromkeys(('system.hosts', 'system.network', 'defaults.host'), _ELSEWHERE),
+    **{f'host.{key}': _ELSEWHERE for key in _OF_HOSTS},
+    **{
+        f'network.{key}': _ELSEWHERE
+        for key in ('discovery', 'domain_id', 'peers', 'server', 'port')
+    },
     **dict.fromkeys(
         ('subscription.content_filter', 'content_filter.expression', 'content_filter.parameters'),
         'only newer versions of rclpy have it',
