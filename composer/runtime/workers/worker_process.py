@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 # As shells have it: 128 and the number of SIGTERM.
 _TERMINATED = 128 + signal.SIGTERM
 _LONGEST_EXIT_SEC = 10.0
+_POLL_SEC = 0.5
 # Those of the system.
 _cpus_before = os.sched_getaffinity(0)
 _nice_before = os.getpriority(os.PRIO_PROCESS, 0)
@@ -85,7 +86,9 @@ class WorkerProcess:
 
     def run(self) -> None:
         """Wait for the end, and exit with its code."""
-        self._ended.wait()
+        # Python handles a signal when this thread runs, and another one may have been interrupted.
+        while not self._ended.wait(_POLL_SEC):
+            pass
         flush_output()
         # Threads and `atexit` functions of behaviours must not keep the process alive.
         with suppress(RuntimeError, ValueError):
