@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer.checks.placement.crossings import (
-    describe_place,
     list_crossings,
+    locate,
     place_of,
     why_crossing,
 )
@@ -15,7 +15,6 @@ from composer.interfaces.descriptions import MessageDescription
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.checks.connections.topology import Endpoint
     from composer.checks.context import CheckContext
     from composer.checks.placement.crossings import Crossing
     from composer.diagnostics import Diagnostic
@@ -59,12 +58,12 @@ def _check_size(context: CheckContext, crossing: Crossing) -> Iterator[Diagnosti
             continue
         if not is_big(context, publisher.entity.type):
             continue
-        where = _tell(publisher), _tell(subscription)
+        where = locate(place_of(publisher)), locate(place_of(subscription))
         yield context.at_key(
             publisher.path,
             'big-crossing-message',
             f"each {publisher.entity.type} of '{publisher.entity.name}' is copied from "
-            f"'{publisher.node.name}' in {where[0]} to '{subscription.node.name}' in {where[1]}",
+            f"'{publisher.node.name}' {where[0]} to '{subscription.node.name}' {where[1]}",
             help='let both run in one worker, or send less: fewer, smaller or compressed messages',
             related=[context.related(subscription.path, 'the subscription is here')],
         )
@@ -83,15 +82,11 @@ def _check_promises(context: CheckContext, crossing: Crossing) -> Iterator[Diagn
             yield context.at_value(
                 path,
                 'not-handed-over',
-                f"'{end.node.name}' runs in {_tell(end)}, and no other end of {channel.kind} "
-                f'{channel.name} does: nothing is handed over',
+                f"'{end.node.name}' runs {locate(place_of(end))}, and no other end of "
+                f'{channel.kind} {channel.name} does: nothing is handed over',
                 help=f"remove '{_LOCAL}', or let both ends run in one worker",
                 related=[context.related(others[0].path, 'the other end is here')],
             )
-
-
-def _tell(end: Endpoint) -> str:
-    return describe_place(place_of(end)) or 'the process of the system'
 
 
 def is_big(context: CheckContext, type_name: str, depth: int = 0) -> bool:

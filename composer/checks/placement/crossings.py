@@ -90,6 +90,13 @@ def describe_place(place: Place) -> str:
     return ' on '.join(filter(None, parts))
 
 
+def locate(place: Place) -> str:
+    """Return `in worker vision on host jetson`, with the words that fit."""
+    host, worker = place
+    where = describe_place(place) or 'the process of the system'
+    return f'on {where}' if host and not worker else f'in {where}'
+
+
 def _list(ends: Iterable[Endpoint]) -> str:
     named = dict.fromkeys(map(_label, ends))
     shown = [*named][:_MOST_NAMED]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.checks.placement.crossings import Place, describe_place
+from composer.checks.placement.crossings import Place, locate
 from composer.diagnostics import Related
 from composer.inference.shared_names import SharedNames
 from composer.language.bindings import exit_bindings
@@ -64,14 +64,12 @@ def _check(context: CheckContext, name: SharedName, uses: _Uses) -> Iterator[Dia
         if not others or place in uses.changed:
             continue
         changer, changed_at = uses.changed[others[0]]
-        where, elsewhere = (
-            describe_place(each) or 'the process of the system' for each in (place, others[0])
-        )
+        where, elsewhere = locate(place), locate(others[0])
         yield context.at_value(
             binding.behaviour.path,
             'shared-across-workers',
-            f"'{binding.behaviour.name}' in {where} reads '{name[1]}' of the module '{name[0]}', "
-            f"which only '{changer.behaviour.name}' in {elsewhere} changes",
+            f"'{binding.behaviour.name}' {where} reads '{name[1]}' of the module '{name[0]}', "
+            f"which only '{changer.behaviour.name}' {elsewhere} changes",
             part=binding.behaviour.name,
             help='publish it, make it a parameter, or let both nodes run in one worker',
             related=[Related('read here', span), Related('changed here', changed_at)],

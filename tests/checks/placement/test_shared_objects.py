@@ -117,7 +117,7 @@ def test_what_each_process_has_for_itself_is_not_shared(find, code):
 def test_hosts_are_other_processes_too(find):
     code = SHARED[0][0]
     (message,) = find(code, NODES.replace('worker: one', 'host: jetson'))
-    assert message.endswith("which only 'parts:write' in host jetson changes")
+    assert message.endswith("which only 'parts:write' on host jetson changes")
 
 
 def test_a_method_counts_with_what_makes_its_instance(find):
