@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from composer.errors import ComposerError
 from composer.hosts.agent_client import HostAgent
-from composer.hosts.clock_skew import describe_skew, measure_skew
 from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host
 from composer.hosts.moves import order_changes, settle_exchanges
+from composer.network.clock_skew import describe_skew, measure_skew
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
@@ -85,7 +85,8 @@ class Deployment:
 
         async def look(agent: HostAgent) -> None:
             self._facts[agent.host.name] = await agent.call('look')
-            skew = describe_skew(agent.host.name, *await measure_skew(agent))
+            found = await measure_skew(lambda: agent.call('clock'))
+            skew = describe_skew(agent.host.name, *found)
             if skew is not None:
                 self._tell(f'warning: {skew}')
 

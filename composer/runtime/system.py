@@ -173,7 +173,7 @@ class System:
         return next((node.ros for node in list(self._nodes.values())), self._control.ros)
 
     def _create_observers(self) -> list[GraphObserver]:
-        return [Introductions(), OtherHosts(self._whole.spec)]
+        return [Introductions(), OtherHosts(lambda: self._whole.spec)]
 
     def _create_control(self, commands: Commands | None) -> ControlNode:
         return ControlNode(

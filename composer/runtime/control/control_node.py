@@ -27,6 +27,7 @@ from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.control.rivals import Rivals
 from composer.runtime.health.diagnostics_publisher import CallWatcher, DiagnosticsPublisher
+from composer.runtime.health.other_clocks import OtherClocks
 from composer.runtime.health.system_state import Outcome, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
@@ -218,6 +219,9 @@ class ControlNode:
         )
         state = self._system.state
         Rivals(self._node, services.queries, state.who(), state.begun, self._give_way)
+        spec = self._system.snapshot.spec
+        if spec.host:
+            OtherClocks(self._node, spec, state)
         self._executor = SystemExecutor(self._context, None, log=self._log)
         self._executor.add_node(self._node)
         # Its interface package is installed with ROS 2, or built for a system with containers.

@@ -137,7 +137,7 @@ def system_status(
         node: The full name of its control node.
         costs: What its process costs, if that was measured.
     """
-    last = state.last_reload
+    last, clocks = state.last_reload, sorted(state.clocks.items())
     values = {
         **{key: str(value) for key, value in state.who().items()},
         'state': state.word,
@@ -145,12 +145,15 @@ def system_status(
         'last reload': '' if last is None else last.outcome.text,
         'last error': state.last_error,
         **({} if costs is None else _describe_costs(costs)),
+        **{f'clock of {host} (ms)': f'{each.ahead_sec * 1000:+.1f}' for host, each in clocks},
     }
+    problems = ['the last reload failed'] if state.last_error else []
+    problems += [f'the clock of {host} differs' for host, each in clocks if each.is_off]
     return DiagnosticStatus(
         name=f'{node}: system',
         hardware_id=state.name,
-        level=DiagnosticStatus.WARN if state.last_error else DiagnosticStatus.OK,
-        message=f'{state.word}; the last reload failed' if state.last_error else state.word,
+        level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
+        message='; '.join([state.word, *problems]),
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
 

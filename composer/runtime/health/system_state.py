@@ -40,6 +40,19 @@ class ReloadReport:
     outcome: Outcome
 
 
+@record
+class ClockSkew:
+    """How far the clock of another host is from that of this one.
+
+    Attributes:
+        ahead_sec: How many seconds it is ahead.
+        is_off: Whether that is too much.
+    """
+
+    ahead_sec: float
+    is_off: bool
+
+
 class SystemState:
     """The state of a system, as it changes.
 
@@ -52,6 +65,7 @@ class SystemState:
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
         find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
+        clocks: Those of other hosts that have been compared, by the names of these.
     """
 
     def __init__(self, name: str, file: str) -> None:
@@ -61,6 +75,7 @@ class SystemState:
         self.is_stopping = False
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
+        self.clocks: dict[str, ClockSkew] = {}
         self.begun = time.monotonic()
         self._started = time.time()
         self._reloads = 0
