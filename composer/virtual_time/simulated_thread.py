@@ -16,6 +16,7 @@ class SimulatedThread:
     Attributes:
         turn: A real lock that is free when it is this thread's turn.
         ident: What `threading.get_ident` says in it; 0 before it has begun.
+        native: What `threading.get_native_id` says in it; 0 before it has begun.
         is_ending: Whether it has been told to end.
         is_over: Whether it has ended.
         looks: How often it has read a clock, or not really waited, since it last did.
@@ -23,12 +24,12 @@ class SimulatedThread:
         error: What is raised where it waits.
     """
 
-    __slots__ = ('error', 'ident', 'is_ending', 'is_over', 'looks', 'on_wait', 'turn')
+    __slots__ = ('error', 'ident', 'is_ending', 'is_over', 'looks', 'native', 'on_wait', 'turn')
 
     def __init__(self) -> None:
         self.turn = REAL.allocate_lock()
         REAL.acquire(self.turn)
-        self.ident = 0
+        self.ident = self.native = 0
         self.is_ending = False
         self.is_over = False
         self.looks = 0

@@ -13,7 +13,7 @@ import logging
 from collections import deque
 from contextlib import contextmanager
 from operator import itemgetter
-from threading import get_ident
+from threading import get_ident, get_native_id
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from composer.errors import ComposerError
@@ -103,7 +103,7 @@ class SimulatedThreads:
             yield
             return
         thread = SimulatedThread()
-        thread.ident = ident
+        thread.ident, thread.native = ident, get_native_id()
         self.by_ident[ident] = self.current = self._visitor = thread
         try:
             yield
@@ -131,7 +131,7 @@ class SimulatedThreads:
     def run(self, thread: SimulatedThread, function: Callable[..., Any], *args: Any) -> None:
         """Call a function when it is the turn of `thread`, which is the calling thread then."""
         REAL.acquire(thread.turn)
-        thread.ident = get_ident()
+        thread.ident, thread.native = get_ident(), get_native_id()
         self.by_ident[thread.ident] = thread
         try:
             if self._preemption is not None:

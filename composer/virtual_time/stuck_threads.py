@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-import time
 from typing import TYPE_CHECKING, Final
 
 from composer.errors import ComposerError
+from composer.runtime.costs.thread_clock import read_thread_clock_ns
 from composer.virtual_time.originals import REAL
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ _WAITED_FACTOR: Final = 3
 # What a thread that was given up gets to end.
 _END_SEC: Final = 1.0
 _LOOK_SEC: Final = 0.01
+_NS_PER_SEC: Final = 1e9
 
 
 class SimulationStuckError(ComposerError):
@@ -83,7 +84,7 @@ class StuckWatch:
 
 
 def _work_of(thread: SimulatedThread | None) -> float:
-    """Return how much processor time a thread has used, in seconds."""
-    if thread is None or not thread.ident:
+    """Return how much processor time a thread has used, in seconds; 0 if it has ended."""
+    if thread is None or not thread.native:
         return 0.0
-    return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))
+    return (read_thread_clock_ns(thread.native) or 0) / _NS_PER_SEC

@@ -9,14 +9,16 @@ import time
 import traceback
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.virtual_time.originals import REAL
+from composer.virtual_time.simulated_thread import SimulatedThread
 from composer.virtual_time.simulated_threads import NothingHappensError
-from composer.virtual_time.stuck_threads import SimulationStuckError
+from composer.virtual_time.stuck_threads import SimulationStuckError, StuckWatch
 from tests.virtual_time.virtual_runs import virtual_time
 
 
@@ -206,6 +208,21 @@ def test_one_that_was_given_up_does_no_more_harm():
         other.start()
         other.join()
     assert seen == ['other']
+
+
+def test_one_that_ends_while_it_is_looked_at_is_not_stuck(wait_for):
+    ended = SimulatedThread()
+
+    def work():
+        ended.ident, ended.native = threading.get_ident(), threading.get_native_id()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    # What Python joins has not ended in the system yet.
+    wait_for(lambda: not Path(f'/proc/self/task/{ended.native}').exists(), 'its end')
+    watch = StuckWatch(limit_sec=60.0)
+    watch.begin('turn', ended)
+    assert not watch.is_stuck('turn', ended)
 
 
 def test_an_error_in_a_thread_is_its_own(capsys, monkeypatch):

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from threading import get_ident
 from time import thread_time_ns
 from typing import TYPE_CHECKING
 
 from composer.runtime.costs.interpreter_waits import InterpreterWaits
 from composer.runtime.costs.lock_holders import LockHolders, Sampled
+from composer.runtime.costs.thread_clock import read_thread_clock_ns
 
 if TYPE_CHECKING:
     from composer.runtime.costs.interpreter_waits import Waits
 
 _NOTHING = 0, 0
-# The clock of a thread, by its number: Linux makes it so, and refuses one of a thread that ended.
-# Source: `make_thread_cpuclock` in include/linux/posix-timers_types.h.
-_CLOCK_BITS, _CLOCK_KIND = 3, 6
 
 
 class CallMeter:
@@ -64,11 +61,8 @@ class CallMeter:
             thread: Its identifier.
             native: Its number in the system.
         """
-        try:
-            now_ns = time.clock_gettime_ns((~native << _CLOCK_BITS) | _CLOCK_KIND)
-        except OSError:
-            return _NOTHING
-        return self._pass(thread, now_ns)
+        now_ns = read_thread_clock_ns(native)
+        return _NOTHING if now_ns is None else self._pass(thread, now_ns)
 
     def _pass(self, thread: int, cpu_ns: int) -> tuple[int, int]:
         holders = self._holders
