@@ -214,11 +214,11 @@ class ControlNode:
     def _serve(self) -> None:
         if self._commands is None or self._node is None or self._executor is not None:
             return
-        self._services = services = ControlServices(
+        self._services = ControlServices(
             self._node, self._system, self._commands, self._status, self._top
         )
         state = self._system.state
-        Rivals(self._node, services.queries, state.who(), state.begun, self._give_way)
+        Rivals(self._node, state.who(), state.begun, self._give_way)
         spec = self._system.snapshot.spec
         if spec.host:
             OtherClocks(self._node, spec, state)

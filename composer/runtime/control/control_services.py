@@ -86,8 +86,6 @@ class ControlServices:
         top: Returns the health of its entities.
 
     Attributes:
-        queries: The callback group of what changes no node: it is served beside a reload, which
-            may wait for a goal.
         answered: When it answered last, a time of `time.monotonic`.
     """
 
@@ -104,18 +102,19 @@ class ControlServices:
 
         self._system = system
         self.answered = float('-inf')
-        self.queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        # What changes no node is served beside a reload, which may wait for a goal.
+        queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
         services = (
-            (protocol.STATUS, status, self.queries),
-            (protocol.TOP, top, self.queries),
-            (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), self.queries),
-            (protocol.DOWN, self._stop_system, self.queries),
+            (protocol.STATUS, status, queries),
+            (protocol.TOP, top, queries),
+            (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries),
+            (protocol.DOWN, self._stop_system, queries),
             (protocol.PLAN, lambda: commands.plan(system), changes),
             (protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes),
             (
                 protocol.RELOAD_NOW,
                 lambda: self._when_up(lambda: commands.reload_now(system)),
-                self.queries,
+                queries,
             ),
         )
         for name, answer, group in services:

@@ -10,12 +10,11 @@ import pytest
 pytest.importorskip('rclpy')
 
 import rclpy
-from rclpy.callback_groups import ReentrantCallbackGroup
 from std_msgs.msg import String
 
 from composer.executor import ComposerExecutor
 from composer.runtime.control.name_claim import NameClaim, list_claims
-from composer.runtime.control.rivals import Rivals
+from composer.runtime.control.rivals import CLAIMS_QOS, Rivals
 from tests.running import DEADLINE_SEC
 
 pytestmark = pytest.mark.ros
@@ -103,11 +102,10 @@ class Host:
         self._node = rclpy.create_node('_composer_a', context=self._context)
         self._executor = ComposerExecutor(context=self._context)
         begun = time.monotonic() - age_sec
-        group = ReentrantCallbackGroup()
-        Rivals(self._node, group, {'host': name}, begun, self.refused_by.append)
+        Rivals(self._node, {'host': name}, begun, self.refused_by.append)
         self._executor.add_node(self._node)
         self._executor.create_task(lambda: None)
-        self._talker = self._node.create_publisher(String, '~/claims', 100)
+        self._talker = self._node.create_publisher(String, '~/claims', CLAIMS_QOS)
 
     def say(self, text):
         self._talker.publish(String(data=text))
