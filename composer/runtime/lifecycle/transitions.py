@@ -192,6 +192,8 @@ class Lifecycle:
         if hook is None:
             return _SUCCESS
         raised: list[BaseException] = []
+        # An edit may have given it another `warn_after` since it was called last.
+        node.drop_limits(key)
         call = node.reported_call(
             Owner(key), hook.path, node.bind(hook), raised.append, deliver=return_result
         )

@@ -349,6 +349,15 @@ class LiveNode:
         self.drop_limits(noun, spec.name)
         entity.change(spec)
 
+    def limits_of(self, noun: str, name: str) -> dict[Owner, HangLimit]:
+        """Return how long behaviours of an entity may run."""
+        whose = (noun, name)
+        return {
+            owner: limit
+            for owner, limit in self.limits.items()
+            if (owner.kind, owner.name) == whose
+        }
+
     def drop_limits(self, noun: str, name: str = '') -> None:
         """Forget how long behaviours of an entity, or of the node itself, may run."""
         _drop(self.limits, noun, name)

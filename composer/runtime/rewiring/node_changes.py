@@ -106,7 +106,12 @@ class NodeChange:
             transaction.on_undo(self._change_back, operation.noun, old, before)
             node.change(operation.noun, spec, before)
             return
+        if before is not None:
+            transaction.on_undo(entities.__setitem__, name, before)
+            transaction.on_commit(before.destroy)
         if operation.action in COMING:
+            transaction.on_undo(node.limits.update, node.limits_of(operation.noun, name))
+            transaction.on_undo(node.drop_limits, operation.noun, name)
             node.drop_limits(operation.noun, name)
             created = self._create(operation.target, spec)
             transaction.on_undo(created.destroy)
@@ -114,9 +119,6 @@ class NodeChange:
                 transaction.on_commit(_start_timer, node, created)
             transaction.on_undo(entities.pop, name, None)
             entities[name] = created
-        if before is not None:
-            transaction.on_undo(entities.__setitem__, name, before)
-            transaction.on_commit(before.destroy)
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             transaction.on_commit(node.forget, operation.noun, name)

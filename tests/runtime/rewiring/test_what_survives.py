@@ -245,6 +245,10 @@ class Edited:
         found = self._peer.node.get_subscriptions_info_by_topic('/clock')
         return [bytes(end.endpoint_gid) for end in found]
 
+    def count_publishers(self, topic):
+        """Return how many publishers a topic has."""
+        return len(self._peer.node.get_publishers_info_by_topic(topic))
+
     def get(self, name):
         """Return the value of a parameter of the clock."""
         (value,) = self.call(GetParameters, '/clock/get_parameters', names=[name]).values
@@ -413,6 +417,19 @@ def test_clocks_and_parameter_files_stay_if_something_else_fails(edited):
     _, said = edited.edit({**failing, '  clock:': '  clock:\n    rosout: false'})
     assert said.startswith('not reloaded: ')
     assert (edited.get('size'), edited.get('use_sim_time')) == (7, True)
+
+
+def test_a_recreated_entity_is_there_again_if_something_else_fails(edited):
+    other_qos = {'Int32, external: true': 'Int32, external: true, qos: 7'}
+    failing = {
+        'FIRST = 0': 'FIRST = 0\n\n\ndef fail(change, changes):\n    return "no"\n',
+        '  ear:': '  ear:\n    use_sim_time: true\n    on_parameters: parts:fail',
+    }
+    _, said = edited.edit({**other_qos, **failing})
+    assert said == "not reloaded: parameter 'use_sim_time' of 'ear': no"
+    _, said = edited.edit(other_qos)
+    assert said.endswith(': ±1 publisher')
+    wait_for(lambda: edited.count_publishers('/ticks') == 1, 'the end of the old publisher')
 
 
 def test_a_node_with_an_action_server_and_client_goes(edited):
