@@ -8,15 +8,14 @@ from __future__ import annotations
 import itertools
 import os
 import signal
-import tempfile
 import threading
-from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
 from composer.processes.external_process import ExternalProcess, ProcessRun, describe_end
 from composer.processes.process_commands import CommandWriter, find_folder
+from composer.processes.process_folder import ProcessFolder
 from composer.processes.process_output import ProcessOutputs
 from composer.processes.reaper_client import ReaperConnection
 from composer.programs import base_environment
@@ -106,7 +105,10 @@ class ProcessSupervisor:
 
     def remove(self, name: str) -> None:
         """End a process, and all that it has started, and forget it."""
-        process = self.by_name.pop(name)
+        self.end(self.by_name.pop(name))
+
+    def end(self, process: ExternalProcess) -> None:
+        """End a process, and all that it has started; it is not started again."""
         process.is_leaving = True
         run, tools = process.run, self._tools
         if run is None or tools is None or run.gone.is_set():
@@ -346,16 +348,16 @@ class Tools:
         ros_arguments: Sequence[str],
         log_levels: Sequence[str],
     ) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix='composer-', ignore_cleanup_errors=True)
-        self.commands = CommandWriter(Path(self._folder.name), ros_arguments, log_levels)
+        self._folder = ProcessFolder()
+        self.commands = CommandWriter(self._folder.path, ros_arguments, log_levels)
         self.outputs = ProcessOutputs()
-        self.reaper = ReaperConnection(take_answer, on_lost, self._folder.name)
+        self.reaper = ReaperConnection(take_answer, on_lost, str(self._folder.path))
 
     def close(self) -> None:
         """Kill what is left of the processes, and remove the temporary files."""
         self.reaper.close()
         self.outputs.close()
-        self._folder.cleanup()
+        self._folder.remove()
 
 
 def _start_error(noun: str, spec: ProcessSpec, answer: dict[str, Any]) -> StartError:
