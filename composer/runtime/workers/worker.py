@@ -82,7 +82,6 @@ class Worker:
         Raises:
             StartError: It cannot be started.
         """
-        self._supervisor.by_name[self.name] = self.process
         self._supervisor.start(self.process)
 
     def call(self, name: str, *arguments: Any, timeout_sec: float | None = None) -> Any:
@@ -182,8 +181,7 @@ class Worker:
     def remove(self, timeout_sec: float) -> None:
         """Stop it, and have its process killed if it does not end."""
         self.stop(timeout_sec)
-        if self._supervisor.by_name.get(self.name) is self.process:
-            self._supervisor.remove(self.name)
+        self._supervisor.end(self.process)
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew."""

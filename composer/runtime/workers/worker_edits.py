@@ -98,11 +98,13 @@ class ChangedWorker:
 class ReplacedWorker:
     """A worker that comes, goes, or needs another process.
 
+    The old process is there until the new one has started: if that fails, its nodes begin there
+    again, with their state.
+
     Args:
         old: The one that goes; `None` if it is new.
         new: The one that comes; `None` if it goes.
         adopt: Called with what there is instead of the old one, `None` for nothing.
-        revive: Starts the old one in another process.
     """
 
     def __init__(
@@ -110,7 +112,6 @@ class ReplacedWorker:
         old: Worker | None,
         new: Worker | None,
         adopt: Callable[[Worker | None], None],
-        revive: Callable[[Worker], None],
         timeout_sec: float,
     ) -> None:
         self._before = old
@@ -118,9 +119,7 @@ class ReplacedWorker:
         self._old = old if old is not None and old.is_alive and old.is_up else None
         self._new = new
         self._adopt = adopt
-        self._revive = revive
         self._timeout_sec = timeout_sec
-        self._has_stopped = False
 
     def wait_for_goals(
         self, _aborts: Callable[[], bool], _is_outdated: Callable[[], bool]
@@ -132,27 +131,23 @@ class ReplacedWorker:
 
     def make_way(self, names: Collection[str]) -> None:
         """See `WorkerEdit`."""
-        if self._old is None:
-            return
-        if self._new is None:
-            self._old.call('make_way', names)
-        else:
-            self._has_stopped = True
-            self._old.remove(self._timeout_sec)
+        if self._old is not None:
+            # A name is that of one node: all of them end for those of the new process.
+            self._old.call('make_way', names if self._new is None else self._old.nodes)
 
     def apply(self, _is_outdated: Callable[[], bool]) -> None:
         """See `WorkerEdit`."""
+        if self._old is not None:
+            self._old.call('apply_edit')
         if self._new is not None:
             self._new.start()
-        elif self._old is not None:
-            self._old.call('apply_edit')
 
     def commit(self) -> None:
         """See `WorkerEdit`."""
         if self._before is not None:
             self._before.leave()
         self._adopt(self._new)
-        if self._old is not None and self._new is None:
+        if self._old is not None:
             with suppress(ComposerError):
                 self._old.call('commit_edit')
             self._old.remove(self._timeout_sec)
@@ -161,11 +156,7 @@ class ReplacedWorker:
         """See `WorkerEdit`."""
         if self._new is not None:
             self._new.remove(self._timeout_sec)
-        if self._old is None:
-            return
-        if self._has_stopped:
-            self._revive(self._old)
-        else:
+        if self._old is not None:
             with suppress(ComposerError):
                 self._old.call('undo_edit')
 

@@ -258,7 +258,7 @@ class Workers:
                 edits.append(ChangedWorker(old, self._assign(snapshot, name)))
             else:
                 adopt = partial(self._adopt, name)
-                edits.append(ReplacedWorker(old, coming, adopt, self._revive, timeout_sec))
+                edits.append(ReplacedWorker(old, coming, adopt, timeout_sec))
         return edits
 
     @contextmanager
@@ -276,14 +276,6 @@ class Workers:
             self._workers.pop(name, None)
         else:
             self._workers[name] = worker
-
-    def _revive(self, old: Worker) -> None:
-        """Start a worker again that was stopped for another one that did not come."""
-        again = Worker(old.spec, self._supervisor, self._calls.functions_for(old.name))
-        again.request, again.assignment = old.request, old.assignment
-        self._workers[old.name] = again
-        again.spawn()
-        again.begin_again()
 
     def begin_stop(self) -> None:
         """Have all workers stop, while the process of the system does."""
