@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import replace
 from types import MappingProxyType
@@ -11,8 +12,14 @@ from composer.language.parsing.process_parser import parse_process
 from composer.network.variables import ZENOH, router_variables
 
 if TYPE_CHECKING:
-    from composer.language.specs import NetworkSpec, SystemSpec
+    from collections.abc import Collection
 
+    from composer.language.specs import HostSpec, NetworkSpec, SystemSpec
+
+# How each process finds the others by way of one host.
+SERVED = ('discovery_server', 'zenoh')
+# A host that others look for here is looked for on their own computers.
+LOOPBACK = re.compile(r'localhost|127(\.\d{1,3}){3}|::1')
 _PROGRAM = 'composer.network.discovery_server'
 
 
@@ -41,9 +48,24 @@ def used_hosts(spec: SystemSpec) -> set[str]:
     found = {each.host for each in spec.nodes.values()}
     found |= {each.host for each in spec.processes.values()}
     network = spec.network
-    if network is not None and network.discovery in ('discovery_server', 'zenoh'):
+    if network is not None and network.discovery in SERVED:
         found.add(network.server)
     return found - {''}
+
+
+def list_sought(spec: SystemSpec, used: Collection[str]) -> list[HostSpec]:
+    """Return the hosts that others look for by their addresses.
+
+    Args:
+        used: The hosts that need each other.
+    """
+    network, hosts = spec.network, spec.hosts
+    if network is None or network.discovery == 'multicast':
+        return []
+    if network.discovery == 'peers':
+        return [host for name, host in hosts.items() if name in used]
+    is_used = any(name != network.server for name in used)
+    return [hosts[network.server]] if network.server in hosts and is_used else []
 
 
 def _find_server(part: SystemSpec, network: NetworkSpec) -> tuple[str, dict[str, Any]] | None:

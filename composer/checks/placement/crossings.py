@@ -8,7 +8,7 @@ from composer.language.specs import NodeSpec
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from composer.checks.connections.topology import Channel, Endpoint, Topology
     from composer.checks.context import CheckContext
@@ -39,10 +39,18 @@ class Crossing:
         return f'{self.channel.kind} {self.channel.name}: {ends}'
 
 
-def find_crossings(topology: Topology) -> Iterator[Crossing]:
-    """Yield what crosses, in the order of the file."""
+def find_crossings(topology: Topology, hosts: Collection[str] = ()) -> Iterator[Crossing]:
+    """Yield what crosses, in the order of the file.
+
+    Args:
+        hosts: Those of the inventory, if there is one: what is on another host is left out, since
+            that is an error of its own.
+    """
     for channel in topology.channels.values():
-        senders, receivers = channel.providers, channel.users
+        senders, receivers = (
+            [each for each in ends if not hosts or place_of(each)[0] in ('', *hosts)]
+            for ends in (channel.providers, channel.users)
+        )
         if channel.kind != 'topic':
             senders, receivers = receivers, senders
         from_here = tuple(_list_crossing(senders, receivers))
@@ -56,7 +64,7 @@ def list_crossings(context: CheckContext) -> list[Crossing]:
     has_hosts = any(each.host for each in spec.nodes.values()) or any(
         each.host for each in spec.processes.values()
     )
-    return [*find_crossings(context.topology)] if spec.workers or has_hosts else []
+    return [*find_crossings(context.topology, spec.hosts)] if spec.workers or has_hosts else []
 
 
 def _list_crossing(ends: list[Endpoint], others: list[Endpoint]) -> Iterator[Endpoint]:

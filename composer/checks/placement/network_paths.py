@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from composer.ament import has_ros
 from composer.checks.environment import installed_middlewares
 from composer.checks.placement.crossings import list_crossings, place_of
+from composer.network.servers import LOOPBACK, SERVED, list_sought
 from composer.network.variables import RANGE, ZENOH
 
 if TYPE_CHECKING:
@@ -15,11 +15,8 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import Discovery, HostSpec, NetworkSpec
+    from composer.language.specs import Discovery, NetworkSpec
 
-_SERVED = ('discovery_server', 'zenoh')
-# A host that others look for here is looked for on their own computers.
-_LOOPBACK = re.compile(r'localhost|127(\.\d{1,3}){3}|::1')
 _DOMAIN = 'ROS_DOMAIN_ID'
 _LOCALHOST_ONLY = 'ROS_LOCALHOST_ONLY'
 _MIDDLEWARE = 'RMW_IMPLEMENTATION'
@@ -49,15 +46,15 @@ def check_network(context: CheckContext) -> Iterator[Diagnostic]:
     yield from _check_environment(context, network, what)
     if network is None:
         return
-    if network.discovery in _SERVED and not network.server:
+    if network.discovery in SERVED and not network.server:
         yield context.at_value(
             context.inner(network.path, 'discovery'),
             'no-network-path',
             f"no host is named for the server of '{network.discovery}', and {what}",
             help=f"write 'server: HOST', as in 'server: {hosts[0]}'",
         )
-    for host in _find_sought(context, network, hosts):
-        if _LOOPBACK.fullmatch(host.address):
+    for host in list_sought(context.spec, hosts):
+        if LOOPBACK.fullmatch(host.address):
             yield context.at_value(
                 (*host.path, 'address'),
                 'no-network-path',
@@ -79,16 +76,6 @@ def _find_crossing(context: CheckContext) -> tuple[str, list[str]] | None:
             first = first or f"{channel.kind} '{channel.name}' crosses between {one} and {other}"
             found |= hosts
     return (first, list(found)) if first else None
-
-
-def _find_sought(context: CheckContext, network: NetworkSpec, used: list[str]) -> list[HostSpec]:
-    """Return the hosts that others look for by their addresses."""
-    hosts = context.spec.hosts
-    if network.discovery == 'peers':
-        return [hosts[name] for name in used if name in hosts]
-    is_used = any(name != network.server for name in used)
-    served = network.discovery in _SERVED and network.server in hosts and is_used
-    return [hosts[network.server]] if served else []
 
 
 def _check_environment(

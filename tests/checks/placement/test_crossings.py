@@ -40,6 +40,7 @@ def reset(node, request):
 def see(node, image):
     node.call('reset') if node.name == 'detector' else None
 """
+CROSSING_RULES = ('unknown-host', 'big-crossing-message', 'not-handed-over', 'no-network-path')
 # Where things run, and the lines that tell what crosses.
 SPLITS = [
     ({}, []),
@@ -93,6 +94,27 @@ def load(tmp_path, monkeypatch):
 def test_what_crosses_is_told(load, split, lines):
     context = create_context(load(split), InterfaceCatalogue())
     assert list(map(str, list_crossings(context))) == lines
+
+
+def test_a_host_that_there_is_not_is_one_finding(load):
+    top = 'hosts: {a: {}, b: {address: 10.0.0.2}}\nnetwork: {discovery: discovery_server}'
+    split = {
+        'camera': 'host: c',
+        'detector': 'host: a',
+        'recorder': 'host: a',
+        'viewer': 'host: a',
+    }
+    system = load(split, top=top)
+    assert list_crossings(create_context(system, InterfaceCatalogue())) == []
+    found = [each.rule for each in check_system(system, InterfaceCatalogue())]
+    assert [each for each in found if each in CROSSING_RULES] == ['unknown-host']
+    # What crosses between others is told.
+    system = load(
+        {**split, 'recorder': 'host: b', 'camera': 'host: a', 'viewer': 'host: c'}, top=top
+    )
+    assert list(map(str, list_crossings(create_context(system, InterfaceCatalogue())))) == [
+        'topic /image: camera (host a) → recorder (host b)'
+    ]
 
 
 @pytest.mark.ros
