@@ -1,6 +1,7 @@
 """What tests of running systems share, as fixtures."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -55,6 +56,21 @@ def other_domain_id():
     """Return a second ROS domain of the test's own."""
     with reserved_domain() as domain:
         yield domain
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    """Run a command in a terminal of 100 by 12; return what types keys, and what it shows."""
+    if shutil.which('tmux') is None:
+        pytest.skip('tmux is not installed')
+
+    def tmux(*words):
+        command = ['tmux', '-S', str(tmp_path / 'tmux'), '-f', '/dev/null', *words]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    yield tmux
+    subprocess.run(['tmux', '-S', str(tmp_path / 'tmux'), 'kill-server'], check=False)
 
 
 @pytest.fixture(scope='session')

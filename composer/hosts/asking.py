@@ -50,12 +50,9 @@ async def ask_composer(
     Args:
         words: The command and its options; the name of the part comes after the first.
     """
-    command, *options = words
 
     def line(host: HostSpec) -> str:
-        part = f'{system}@{host.name}'
-        program = f'{host.folder}/systems/{shlex.quote(system)}/live/composer'
-        return f'{program} {shlex.join([command, part, *options])}'
+        return composer_command(system, host, *words)
 
     return await ask_all(hosts, line, timeout_sec)
 
@@ -77,6 +74,13 @@ async def ask_all(
         return Reply(host, done.exit_status, str(done.stdout), str(done.stderr))
 
     return list(await asyncio.gather(*map(ask, hosts)))
+
+
+def composer_command(system: str, host: HostSpec, *words: str) -> str:
+    """Return the command line that runs Composer for a part; see `ask_composer`."""
+    command, *options = words
+    program = f'{host.folder}/systems/{shlex.quote(system)}/live/composer'
+    return f'{program} {shlex.join([command, f"{system}@{host.name}", *options])}'
 
 
 def state_command(system: str, host: HostSpec) -> str:

@@ -7,6 +7,8 @@ https://asyncssh.readthedocs.io/en/latest/api.html#supported-client-config-optio
 from __future__ import annotations
 
 import asyncio
+import os
+import stat
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,7 +39,7 @@ async def connect(host: HostSpec) -> asyncssh_types.SSHClientConnection:
     asyncssh = import_asyncssh()
     try:
         connection: asyncssh_types.SSHClientConnection = await asyncssh.connect(
-            **_options(host),
+            **_without_open_keys(host, _options(host)),
             login_timeout=_LOGIN_SEC,
             keepalive_interval=_KEEPALIVE_SEC,
             keepalive_count_max=_MOST_UNANSWERED,
@@ -92,14 +94,69 @@ def _options(host: HostSpec) -> dict[str, Any]:
     return options
 
 
+def _without_open_keys(host: HostSpec, options: dict[str, Any]) -> dict[str, Any]:
+    """Return options that use no file of a key that others can read: ssh does not, either.
+
+    Raises:
+        HostConnectionError: There are only such files.
+    """
+    given = options.get('client_keys') or _resolve(host).config.get('IdentityFile')
+    paths = [Path(each).expanduser() for each in given or _list_default_keys()]
+    files = [path for path in paths if path.is_file()]
+    open_files = [path for path in files if _is_open(path)]
+    if not open_files:
+        return options
+    closed = [str(path) for path in files if path not in open_files]
+    if not closed:
+        path = open_files[0]
+        mode = stat.S_IMODE(path.stat().st_mode)
+        message = (
+            f"host {host.name}: the key '{path}' is not used, as ssh does not: "
+            f'others can read it (mode {mode:o})'
+        )
+        raise HostConnectionError(message, help=f"chmod 600 '{path}'")
+    return {**options, 'client_keys': closed, 'ignore_encrypted': True}
+
+
+def _list_default_keys() -> list[Path]:
+    return [path for path in sorted((Path.home() / '.ssh').glob('id_*')) if path.suffix != '.pub']
+
+
+def _is_open(path: Path) -> bool:
+    """Return whether a key is ours, and others can read it; so does ssh decide.
+
+    Source: `sshkey_perm_ok` of https://github.com/openssh/openssh-portable/blob/master/authfile.c
+    """
+    found = path.stat()
+    return path.suffix != '.pub' and found.st_uid == os.getuid() and bool(found.st_mode & 0o077)
+
+
+def _resolve(host: HostSpec) -> Any:
+    """Return what the configuration of ssh says of a host, without its keys."""
+    options = {**_options(host), 'client_keys': None}
+    return import_asyncssh().SSHClientConnectionOptions(**options)
+
+
+def find_real_address(host: HostSpec) -> str:
+    """Return the `HostName` that the configuration of ssh has for the address of a host.
+
+    Without one, it is the address itself.
+
+    Raises:
+        HostConnectionError: The configuration cannot be read.
+    """
+    try:
+        return _resolve(host).host or host.address
+    except ValueError as error:
+        message = f'host {host.name} ({host.address}): {error}'
+        raise HostConnectionError(message, help='see ~/.ssh/config') from error
+
+
 def _explain_keys(host: HostSpec) -> HostConnectionError | None:
     """Return which of our files of keys cannot be used; `None` if all can."""
     given = host.identity_file
-    folder = Path.home() / '.ssh'
-    paths = [Path(given).expanduser()] if given else sorted(folder.glob('id_*'))
+    paths = [Path(given).expanduser()] if given else _list_default_keys()
     for path in paths:
-        if not given and path.suffix == '.pub':
-            continue
         try:
             import_asyncssh().load_keypairs([str(path)], ignore_encrypted=True)
         except (OSError, ValueError) as error:
@@ -141,7 +198,7 @@ _KEY_OPTIONS = ('host', 'port', 'config')
 def _is_known(host: HostSpec) -> bool:
     """Return whether there is a key of this host."""
     asyncssh = import_asyncssh()
-    options = asyncssh.SSHClientConnectionOptions(**_options(host))
+    options = _resolve(host)
     names = {host.address, options.host, options.host_key_alias} - {None, ''}
     for path in (Path.home() / '.ssh/known_hosts', Path('/etc/ssh/ssh_known_hosts')):
         for name in names:

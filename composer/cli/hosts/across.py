@@ -14,10 +14,11 @@ from composer import signals
 from composer.cli.common.argument_types import split_words
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
+from composer.cli.hosts.top_hosts import merge_health, watch_hosts
 from composer.cli.running import answer_forms
 from composer.cli.running.client import RunningSystem
 from composer.cli.running.ps import print_systems
-from composer.cli.running.top import print_health
+from composer.cli.running.top import has_screen, print_health
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.hosts.asking import (
@@ -36,6 +37,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from composer.cli.running.asked_system import AskedSystem
     from composer.cli.running.top_table import View
     from composer.language.specs import HostSpec
 
@@ -46,9 +48,9 @@ _NOT_RUNNING = 'not running'
 _RUNNING_STATES = ('active', 'reloading')
 
 
-def ps_across(words: Sequence[str], *, format_name: str) -> int:
+def ps_across(asked: AskedSystem, *, format_name: str) -> int:
     """Print the parts of a system; return the exit code: 1 if a host cannot be asked."""
-    system, hosts = _read(words)
+    system, hosts = _read(asked)
     replies = asyncio.run(ask_composer(system, hosts, 'ps', '--format=json'))
     parts = [_part(system, each) for each in replies]
     silent = _find_silent(system, replies, parts)
@@ -92,26 +94,31 @@ def _part(system: str, reply: Reply) -> RunningSystem:
     return RunningSystem(name, '', None, _NOT_RUNNING)
 
 
-def top_across(words: Sequence[str], view: View, *, format_name: str) -> int:
-    """Print the health of the entities on all hosts once; return the exit code."""
-    system, hosts = _read(words)
+def top_across(asked: AskedSystem, view: View, *, once: bool, format_name: str) -> int:
+    """Show the health of the entities on all hosts; return the exit code.
+
+    Args:
+        view: What to show first.
+        once: Whether to print it once. So it is where there is no screen, and as JSON.
+    """
+    system, hosts = _read(asked)
+    if not once and format_name != 'json' and has_screen():
+        watch_hosts(system, hosts, view)
+        return ExitCode.DONE
     replies = asyncio.run(ask_composer(system, hosts, 'top', '--once', '--format=json'))
-    merged: dict[str, Any] = {}
+    told: dict[str, dict[str, Any]] = {}
     for each in replies:
         with suppress(ComposerError):
-            told = answer_forms.read_answer(each.output, answer_forms.TOP)
-            for key, value in told.items():
-                known = merged.get(key)
-                merged[key] = known + value if isinstance(known, list) else value
-    if merged:
-        print_health(merged, view, format_name)
+            told[each.host.name] = answer_forms.read_answer(each.output, answer_forms.TOP)
+    if told:
+        print_health(merge_health(told), view, format_name)
     _tell_problems(replies)
     return _code(replies, all_must=True)
 
 
-def reload_across(words: Sequence[str], timeout_sec: float, *, aborts_goals: bool) -> int:
+def reload_across(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool) -> int:
     """Let each part read its files again; return the exit code."""
-    system, hosts = _read(words)
+    system, hosts = _read(asked)
     options = [f'--timeout={timeout_sec:g}', *['--now'] * aborts_goals]
     replies = asyncio.run(ask_composer(system, hosts, 'reload', *options, timeout_sec=timeout_sec))
     for each in replies:
@@ -120,9 +127,9 @@ def reload_across(words: Sequence[str], timeout_sec: float, *, aborts_goals: boo
     return _code(replies, all_must=True)
 
 
-def down_across(words: Sequence[str], timeout_sec: float) -> int:
+def down_across(asked: AskedSystem, timeout_sec: float) -> int:
     """Stop each part, until its host starts again or is deployed to; return the exit code."""
-    system, hosts = _read(words)
+    system, hosts = _read(asked)
     replies = asyncio.run(
         ask_all(hosts, lambda host: stop_command(system, host), timeout_sec + _STOP_SEC)
     )
@@ -133,9 +140,9 @@ def down_across(words: Sequence[str], timeout_sec: float) -> int:
     return _code(replies, all_must=True)
 
 
-def logs_across(words: Sequence[str], *, follows: bool) -> int:
+def logs_across(asked: AskedSystem, *, follows: bool) -> int:
     """Print what the parts have said, each line with its host; return the exit code."""
-    system, hosts = _read(words)
+    system, hosts = _read(asked)
     width = max(len(host.name) for host in hosts)
 
     def take(host: HostSpec, text: str) -> None:
@@ -150,20 +157,20 @@ def logs_across(words: Sequence[str], *, follows: bool) -> int:
     return ExitCode.FAILED if problems else ExitCode.DONE
 
 
-def _read(words: Sequence[str]) -> tuple[str, list[HostSpec]]:
+def _read(asked: AskedSystem) -> tuple[str, list[HostSpec]]:
     """Return the name of a system, and its hosts.
 
     Raises:
         ComposerError: The file has errors, or no hosts.
     """
     import_asyncssh()
-    paths, arguments = split_words(words)
-    system = load_given(paths, arguments)
+    paths, arguments = split_words(asked.words)
+    system = load_given(paths, arguments, asked.set_values)
     if system.spec is None or has_errors(system.diagnostics):
         show_findings(system.diagnostics)
         message = f"'{paths[0]}' has errors"
         raise ComposerError(message)
-    return system.spec.name, choose_hosts(system.spec)
+    return system.spec.name, choose_hosts(system.spec, asked.hosts)
 
 
 def escape_each(text: str) -> str:

@@ -18,18 +18,19 @@ from composer.cli.common.system_reader import list_files
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
 from composer.hosts.bundle import Bundle, choose_hosts
-from composer.hosts.connection import import_asyncssh
+from composer.hosts.connection import find_real_address, import_asyncssh
 from composer.hosts.deployment import Deployment
 from composer.hosts.host_plan import render_plan
 from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.network.servers import LOOPBACK, list_sought, used_hosts
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Sequence
+    from collections.abc import Coroutine, Iterator, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.language.specs import HostSpec
+    from composer.language.specs import HostSpec, SystemSpec
 
 
 def deploy(
@@ -61,7 +62,7 @@ def deploy(
     chosen = choose_hosts(context.spec, hosts)
     if removes:
         return _run(_remove(context.spec.name, chosen))
-    settings = [f'--set={each}' for each in set_values]
+    settings = [f'--set={each}' for each in (*set_values, *find_addresses(context.spec))]
     bundle = Bundle(context, paths, list_files(context), [*words, *settings])
     return _run(_deploy(context.spec.name, chosen, bundle, only_plans=only_plans))
 
@@ -106,6 +107,24 @@ def _read(
         findings += find_unplaced(context)
     show_findings(findings)
     return None if has_errors(findings) else context
+
+
+def find_addresses(spec: SystemSpec) -> Iterator[str]:
+    """Yield values to set: addresses by which hosts find each other, where ssh has others.
+
+    Raises:
+        ComposerError: The configuration of ssh cannot be read.
+    """
+    for host in list_sought(spec, used_hosts(spec)):
+        address = find_real_address(host)
+        if address == host.address:
+            continue
+        known = f"host {host.name}: '{host.address}' is {address} for ssh here (HostName)"
+        if LOOPBACK.fullmatch(address):
+            _tell(f"warning: {known}: all hosts must know it as '{host.address}'")
+        else:
+            _tell(f'{known}: the hosts find each other by that')
+            yield f'hosts.{host.name}.address={address}'
 
 
 async def _deploy(

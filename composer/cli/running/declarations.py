@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, split_words, takes_system
+from composer.cli.common.argument_types import (
+    NUMBERS_ARE_VALUES,
+    split_words,
+    takes_settings,
+    takes_system,
+)
+from composer.cli.running.asked_system import AskedSystem
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable
 
 _LONGEST_SEC = 60.0
 _ANSWER_SEC = 5.0
 
-_system = click.argument('words', nargs=-1, metavar='[SYSTEM | FILE [LAYER]...]')
 _timeout = click.option(
     '--timeout',
     'timeout_sec',
@@ -36,43 +42,51 @@ _format = click.option(
 )
 
 
-def _are_files(words: Sequence[str]) -> bool:
-    """Return whether the words name a system by its files: its hosts are asked."""
-    return bool(words) and words[0].endswith(('.yaml', '.yml'))
+def _takes_asked(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the name of a system to a command, or its files with what they are read with."""
 
+    @click.argument('words', nargs=-1, metavar='[SYSTEM | FILE [LAYER]... [NAME:=VALUE]...]')
+    @takes_settings
+    @click.option(
+        '--host',
+        'hosts',
+        multiple=True,
+        metavar='NAME',
+        help='Of a FILE, only this host. Can be repeated.',
+    )
+    @wraps(command)
+    def run(
+        *,
+        words: tuple[str, ...],
+        set_values: tuple[str, ...],
+        hosts: tuple[str, ...],
+        **options: object,
+    ) -> int:
+        return command(AskedSystem(words, set_values, hosts), **options)
 
-def _system_of(words: Sequence[str]) -> str | None:
-    """Return the name of a system; `None` if none was given.
-
-    Raises:
-        click.UsageError: There is more than a name.
-    """
-    if len(words) > 1:
-        message = f'Got unexpected extra argument ({words[1]})'
-        raise click.UsageError(message, click.get_current_context())
-    return words[0] if words else None
+    return run
 
 
 @click.command('ps')
-@_system
+@_takes_asked
 @_format
-def ps_command(words: tuple[str, ...], format_name: str) -> int:
+def ps_command(asked: AskedSystem, format_name: str) -> int:
     """List the systems that run on this ROS graph, or SYSTEM alone.
 
     Of a FILE that declares hosts, its parts are listed: each host is asked over SSH.
     If there is no such system, or it does not answer, the exit code is 1.
     """
-    if _are_files(words):
+    if asked.are_files:
         from composer.cli.hosts.across import ps_across
 
-        return ps_across(words, format_name=format_name)
+        return ps_across(asked, format_name=format_name)
     from composer.cli.running.ps import list_running
 
-    return list_running(_system_of(words), format_name=format_name)
+    return list_running(asked.name, format_name=format_name)
 
 
 @click.command('top')
-@_system
+@_takes_asked
 @click.option('--once', is_flag=True, help='Print the table once.')
 @_format
 @click.option(
@@ -83,29 +97,36 @@ def ps_command(words: tuple[str, ...], format_name: str) -> int:
     help='The column to sort by.',
 )
 @click.option('--filter', 'text', default='', metavar='TEXT', help='Only entities with this text.')
+# For a screen that shows several hosts.
+@click.option('--each-period', is_flag=True, hidden=True)
 def top_command(
-    words: tuple[str, ...], format_name: str, sort: str, text: str, *, once: bool
+    asked: AskedSystem,
+    format_name: str,
+    sort: str,
+    text: str,
+    *,
+    once: bool,
+    each_period: bool,
 ) -> int:
     """Show the health of each entity of SYSTEM in the last period.
 
     Calls in a second, callback times, the share of a processor, messages that wait in the queue;
     and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
     runs, it need not be named; of a FILE that declares hosts, all of these are asked.
-    Where the output is no terminal that can draw, as JSON, and of several hosts, it is printed
-    once.
+    Where the output is no terminal that can draw, and as JSON, it is printed once.
     """
     view = View(sort=sort, text=text)
-    if _are_files(words):
+    if asked.are_files:
         from composer.cli.hosts.across import top_across
 
-        return top_across(words, view, format_name=format_name)
+        return top_across(asked, view, once=once, format_name=format_name)
     from composer.cli.running.top import top
 
-    return top(_system_of(words), view, once=once, format_name=format_name)
+    return top(asked.name, view, once=once, format_name=format_name, each_period=each_period)
 
 
 @click.command('reload')
-@_system
+@_takes_asked
 @_timeout
 @click.option(
     '--now',
@@ -113,20 +134,20 @@ def top_command(
     is_flag=True,
     help='Abort goals in flight of actions that go, which it waits for otherwise.',
 )
-def reload_command(words: tuple[str, ...], timeout_sec: float, *, aborts_goals: bool) -> int:
+def reload_command(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool) -> int:
     """Let SYSTEM read its files again, and become what they say.
 
     SYSTEM is its name, that of its file without the ending; if only one runs, it need not be
     named; of a FILE that declares hosts, all of these are told. If the files have errors, it runs
     on as it was.
     """
-    if _are_files(words):
+    if asked.are_files:
         from composer.cli.hosts.across import reload_across
 
-        return reload_across(words, timeout_sec, aborts_goals=aborts_goals)
+        return reload_across(asked, timeout_sec, aborts_goals=aborts_goals)
     from composer.cli.running.commanding import reload
 
-    return reload(_system_of(words), timeout_sec, aborts_goals=aborts_goals)
+    return reload(asked.name, timeout_sec, aborts_goals=aborts_goals)
 
 
 @click.command('restart')
@@ -144,39 +165,39 @@ def restart_command(node: str, timeout_sec: float) -> int:
 
 
 @click.command('down')
-@_system
+@_takes_asked
 @_timeout
-def down_command(words: tuple[str, ...], timeout_sec: float) -> int:
+def down_command(asked: AskedSystem, timeout_sec: float) -> int:
     """Stop SYSTEM, and wait until it has stopped.
 
     SYSTEM is its name; if only one runs, it need not be named. A FILE that declares hosts is
     stopped on all of them, until they boot or are deployed to.
     """
-    if _are_files(words):
+    if asked.are_files:
         from composer.cli.hosts.across import down_across
 
-        return down_across(words, timeout_sec)
+        return down_across(asked, timeout_sec)
     from composer.cli.running.commanding import down
 
-    return down(_system_of(words), timeout_sec)
+    return down(asked.name, timeout_sec)
 
 
 @click.command('logs')
-@_system
+@_takes_asked
 @click.option('--follow', '-f', 'follows', is_flag=True, help='Go on until the system ends.')
-def logs_command(words: tuple[str, ...], *, follows: bool) -> int:
+def logs_command(asked: AskedSystem, *, follows: bool) -> int:
     """Print what SYSTEM on this host has said.
 
     It must write to a file, as 'composer up --detach' does. Of one that has ended, the last log is
     printed. Of a FILE that declares hosts, their logs are printed, each line with its host.
     """
-    if _are_files(words):
+    if asked.are_files:
         from composer.cli.hosts.across import logs_across
 
-        return logs_across(words, follows=follows)
+        return logs_across(asked, follows=follows)
     from composer.cli.running.log_files import show_logs
 
-    return show_logs(_system_of(words), follows=follows)
+    return show_logs(asked.name, follows=follows)
 
 
 @click.command('capture')

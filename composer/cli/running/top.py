@@ -6,7 +6,7 @@ import json
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -34,7 +34,9 @@ _POLL_SEC = 0.1
 _MOST_PERIODS = 3
 
 
-def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
+def top(
+    name: str | None, view: View, *, once: bool, format_name: str, each_period: bool = False
+) -> int:
     """Show the health of each entity; return the exit code.
 
     Args:
@@ -42,6 +44,7 @@ def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
         view: What to show first.
         once: Whether to print it once. So it is where there is no screen.
         format_name: `text` or `json`; JSON is printed once.
+        each_period: Whether to print a line of JSON in each period, until nobody reads it.
 
     Raises:
         ComposerError: There is no such system, it measures nothing, or it ended.
@@ -49,14 +52,17 @@ def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
     with Client() as client:
         system = Discovery(client).find(name)
         with client.asking(system, protocol.TOP) as ask:
-            if once or format_name == 'json' or not _has_screen():
+            if each_period:
+                _print_each(ask)
+            if once or format_name == 'json' or not has_screen():
                 document = _wait_for_all(ask)
                 print_health(document, view, format_name)
                 return ExitCode.DONE
             return _watch(system, ask, view)
 
 
-def _has_screen() -> bool:
+def has_screen() -> bool:
+    """Return whether there is a terminal that can draw."""
     from composer.cli.running.top_screen import can_draw
 
     return sys.stdout.isatty() and sys.stdin.isatty() and can_draw()
@@ -77,6 +83,16 @@ def _read(outcome: Outcome) -> dict[str, Any]:
     if not outcome.succeeded:
         raise ComposerError(outcome.text)
     return answer_forms.read_answer(outcome.text, answer_forms.TOP)
+
+
+def _print_each(ask: Callable[[float], Outcome]) -> NoReturn:
+    printed = None
+    while True:
+        document = _read(ask(STATUS_SEC))
+        if document['period'] != printed:
+            click.echo(json.dumps(document))
+            printed = document['period']
+        time.sleep(max(_POLL_SEC, document['period_sec'] / 2))
 
 
 def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:

@@ -137,7 +137,7 @@ class _Screen:
             self._window.refresh()
             return
         entities = select_entities(document['entities'], self._view)
-        worst = [describe_worst(each) for each in find_worst(document)]
+        worst = [*map(describe_worst, find_worst(document)), *document.get('problems', ())]
         room = max(0, height - 3 - len(worst))
         self._top = max(0, min(self._top, len(entities) - room))
         header, *rows = render_entities(entities)

@@ -65,6 +65,8 @@ COLUMNS = (
 )
 # Only of systems with workers; an empty one is the process of the system.
 _WORKER = Column('WORKER', lambda entity: escape(entity['worker']) or None, str)
+# Only of several hosts.
+_HOST = Column('HOST', lambda entity: escape(entity.get('host', '')) or None, str)
 SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
 }
@@ -104,14 +106,18 @@ def find_worst(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return which entities kept the interpreter (GIL) from others that waited for it.
 
     Returns:
-        One at most for each process: `worker`, `node`, `entity`, its share `gil`, and how long
-        the others waited, `wait_mean_ms` and `wait_max_ms`.
+        One at most for each process: `host` if there are several, `worker`, `node`, `entity`,
+        its share `gil`, and how long the others waited, `wait_mean_ms` and `wait_max_ms`.
     """
     return [worst for each in document['processes'] if (worst := _worst_of(document, each))]
 
 
+def _place(each: Mapping[str, Any]) -> tuple[str, str]:
+    return each.get('host', ''), each['worker']
+
+
 def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[str, Any] | None:
-    mates = [each for each in document['entities'] if each['worker'] == process['worker']]
+    mates = [each for each in document['entities'] if _place(each) == _place(process)]
     known = [each for each in mates if each['gil'] is not None]
     worst = max(known, key=lambda each: float(each['gil']), default=None)
     if worst is None or worst['gil'] < _KEPT_SHARE:
@@ -119,7 +125,9 @@ def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[s
     has_others = any(each['node'] != worst['node'] and each['calls'] for each in mates)
     if not has_others or (process['gil_wait_mean_ms'] or 0.0) < _WAITED_MS:
         return None
+    where = {'host': worst['host']} if 'host' in worst else {}
     return {
+        **where,
         'worker': worst['worker'],
         'node': worst['node'],
         'entity': _describe(worst).removeprefix(f'{worst["node"]}: '),
@@ -132,6 +140,7 @@ def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[s
 def describe_worst(worst: Mapping[str, Any]) -> str:
     """Return a line about one that `find_worst` returned."""
     where = f' in worker {worst["worker"]}' if worst['worker'] else ''
+    where += f' on host {worst["host"]}' if 'host' in worst else ''
     return escape(
         f'{worst["node"]}: {worst["entity"]} keeps the interpreter (GIL){where} '
         f'{worst["gil"]:.0%} of the time: the others wait {worst["wait_mean_ms"]:.1f} ms for it '
@@ -142,7 +151,9 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
 def render_entities(entities: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the lines of the table, its header first."""
     has_workers = any(each['worker'] for each in entities)
-    columns = (*COLUMNS, _WORKER) if has_workers else COLUMNS
+    has_hosts = any(each.get('host') for each in entities)
+    entity, *figures = COLUMNS
+    columns = (entity, *(_HOST,) * has_hosts, *figures, *(_WORKER,) * has_workers)
     rows = [
         ['-' if (value := each.value(entity)) is None else each.show(value) for each in columns]
         for entity in entities

@@ -3,7 +3,6 @@
 import json
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 
@@ -11,6 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.cli.hosts.top_hosts import merge_health
 from composer.cli.main import run
 from composer.cli.running.top_table import (
     View,
@@ -135,6 +135,22 @@ def process(worker='', **figures):
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, 'gil': 0.9, **waits, **figures}
 
 
+def test_hosts_have_workers_of_the_same_name_and_a_column():
+    told = {
+        'base': {'processes': [process()], 'entities': ENTITIES[:1]},
+        'jetson': {'processes': [process()], 'entities': ENTITIES[1:]},
+    }
+    document = merge_health(told)
+    lines = render_entities(document['entities'])
+    assert lines[0].split()[:3] == ['ENTITY', 'HOST', 'RATE/S']
+    assert [line.split()[3] for line in lines[1:]] == ['base', 'jetson', 'jetson']
+    # The node that waits for the interpreter is on another host.
+    assert find_worst(document) == []
+    both = merge_health({**told, 'rear': {'processes': [process()], 'entities': ENTITIES}})
+    (worst,) = find_worst(both)
+    assert '(GIL) on host rear 75% of' in describe_worst(worst)
+
+
 def test_the_entity_is_named_that_keeps_the_interpreter_from_others():
     (worst,) = find_worst({'processes': [process()], 'entities': ENTITIES})
     assert describe_worst(worst) == (
@@ -202,21 +218,6 @@ def test_a_system_that_measures_nothing_is_told_of(compose, capsys):
     assert capsys.readouterr()[1] == (
         "error: the system measures nothing: its file says 'diagnostics: false'\n"
     )
-
-
-@pytest.fixture
-def terminal(tmp_path):
-    """Run a command in a terminal of 100 by 12; return what types keys, and what it shows."""
-    if shutil.which('tmux') is None:
-        pytest.skip('tmux is not installed')
-
-    def tmux(*words):
-        command = ['tmux', '-S', str(tmp_path / 'tmux'), '-f', '/dev/null', *words]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-        return done.stdout
-
-    yield tmux
-    subprocess.run(['tmux', '-S', str(tmp_path / 'tmux'), 'kill-server'], check=False)
 
 
 @pytest.mark.ros
