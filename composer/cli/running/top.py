@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from composer.runtime.health.system_state import Outcome
 
 _POLL_SEC = 0.1
-# What calls cost the processor is known after the second period that somebody looks.
+# What calls cost is known after the second period that somebody looks, as a rule.
 _MOST_PERIODS = 3
 
 

@@ -92,7 +92,7 @@ def describe_top(
         'name': state.name,
         'period': latest.number,
         'period_sec': diagnostics.period_sec,
-        'has_cpu': latest.costs is not None,
+        'has_cpu': latest.costs is not None and not latest.costs.awaits_samples,
         'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
         'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
         + [_describe_delivery(key, each) for key, each in deliveries.items()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from threading import get_ident
 from time import thread_time_ns
 from typing import TYPE_CHECKING
@@ -38,7 +39,11 @@ class CallMeter:
         if on == self.is_on:
             return
         if on:
-            self._marks = {}
+            self._marks = {
+                each.ident: (read_thread_clock_ns(each.native_id) or 0, 0)
+                for each in threading.enumerate()
+                if each.ident is not None and each.native_id is not None
+            }
             self._holders, self._waits = LockHolders(), InterpreterWaits()
         elif self._holders is not None and self._waits is not None:
             self.is_on = False
@@ -47,7 +52,9 @@ class CallMeter:
         self.is_on = on
 
     def lap(self) -> tuple[int, int]:
-        """Return what this thread has used since it was last asked, nothing the first time.
+        """Return what this thread has used since it was last asked, or it was turned on.
+
+        It is nothing the first time in a thread that is newer than that.
 
         Returns:
             Time of the processor, and how long it held the interpreter, in nanoseconds.
@@ -77,6 +84,11 @@ class CallMeter:
     def sampled(self) -> Sampled:
         """Return how long holders of the interpreter have been sampled since it was turned on."""
         return Sampled(0, 0) if self._holders is None else self._holders.sampled()
+
+    @property
+    def is_sampling(self) -> bool:
+        """Whether holders of the interpreter are sampled, or soon will be."""
+        return self._holders is not None and self._holders.is_running
 
     def take_waits(self) -> Waits | None:
         """Return how long others waited for the interpreter since this was last asked."""

@@ -68,6 +68,11 @@ class LockHolders:
             # Source: https://docs.kernel.org/admin-guide/LSM/Yama.html
             ctypes.CDLL(None).prctl(_PR_SET_PTRACER, ctypes.c_ulong(self._process.pid), 0, 0, 0)
 
+    @property
+    def is_running(self) -> bool:
+        """Whether there are samples, or may still be."""
+        return self._process is not None and self._process.poll() is None
+
     def sampled(self) -> Sampled:
         """Return what was sampled."""
         return Sampled(self._table[lock_sampler.ELAPSED], self._table[lock_sampler.HELD])

@@ -23,6 +23,8 @@ class ProcessCosts:
         cores: How many processor cores it may use.
         cpu: How many processors the process used on average, with all of its threads.
         sampled_ns: How long it was sampled who holds the interpreter; 0 if that cannot be known.
+        awaits_samples: Whether there was no sample in time, and a later period may have some: the
+            sampler has just begun, or processors are scarce.
         held: The share of that time in which somebody held it; `None` if that cannot be known.
         waits: How long others waited for it; `None` if that was not measured.
     """
@@ -30,6 +32,7 @@ class ProcessCosts:
     cores: int
     cpu: float
     sampled_ns: int
+    awaits_samples: bool
     held: float | None
     waits: Waits | None
 
@@ -61,6 +64,7 @@ class ProcessMeter:
             cores=len(os.sched_getaffinity(0)),
             cpu=(self._cpu_ns - before_ns) / _NS_PER_SEC / period_sec,
             sampled_ns=sampled_ns,
+            awaits_samples=not sampled_ns and call_meter.is_sampling,
             held=min(1.0, held_ns / sampled_ns) if sampled_ns else None,
             waits=call_meter.take_waits(),
         )

@@ -19,7 +19,7 @@ from composer.cli.running.top_table import (
     render_entities,
     select_entities,
 )
-from tests.running import ROOT
+from tests.running import ROOT, wait_for
 
 SYSTEM = """
 version: 1
@@ -183,32 +183,53 @@ def test_each_worker_has_its_own_worst():
     assert '(GIL) in worker eyes 38% of' in describe_worst(found[1])
 
 
+@pytest.fixture
+def look_until(capsys):
+    """Return the first answer that is as it must be: on a crowded machine, one may mislead."""
+
+    def look_until(is_so, what):
+        def look():
+            assert run(['top', '--once', '--format', 'json']) == 0
+            document = json.loads(capsys.readouterr()[0])
+            return is_so(document) and document
+
+        return wait_for(look, what)
+
+    return look_until
+
+
 @pytest.mark.ros
-def test_the_node_is_named_whose_callbacks_keep_the_interpreter(compose, capsys):
+def test_the_node_is_named_whose_callbacks_keep_the_interpreter(compose, look_until):
     compose(HOG_SYSTEM, HOG_CODE).wait_until_ready()
-    assert run(['top', '--once', '--format', 'json']) == 0
-    document = json.loads(capsys.readouterr()[0])
-    found = {each['node']: each for each in document['entities']}
-    # What computes in C without the interpreter keeps it from nobody.
-    assert found['/hog']['gil'] > 0.5
-    assert found['/polite']['gil'] < 0.3
-    assert [(each['node'], each['entity']) for each in document['gil_kept_by']] == [
-        ('/hog', 'timer loop')
-    ]
-    assert document['processes'][0]['gil'] >= found['/hog']['gil']
+
+    def is_measured(document):
+        shares = {each['node']: each['gil'] for each in document['entities']}
+        # What computes in C without the interpreter keeps it from nobody.
+        return None not in shares.values() and shares['/hog'] > 0.5 and shares['/polite'] < 0.3
+
+    def is_named(document):
+        named = [(each['node'], each['entity']) for each in document['gil_kept_by']]
+        return is_measured(document) and named == [('/hog', 'timer loop')]
+
+    document = look_until(is_named, 'the node to be named')
+    (share,) = (each['gil'] for each in document['entities'] if each['node'] == '/hog')
+    assert document['processes'][0]['gil'] >= share
 
 
 @pytest.mark.ros
-def test_what_calls_cost_is_measured_while_somebody_looks(compose, capsys):
+def test_what_calls_cost_is_measured_while_somebody_looks(compose, look_until):
     compose(SYSTEM + 'diagnostics: {period: 0.5}\n', CODE).wait_until_ready()
-    assert run(['top', '--once', '--format', 'json']) == 0
-    document = json.loads(capsys.readouterr()[0])
-    assert document['has_cpu']
-    found = {each['name']: each for each in document['entities']}
-    assert found.keys() == {'busy', 'idle', 'numbers'}
-    assert found['idle']['mean_ms'] >= 20.0
-    assert found['busy']['cpu'] > 3 * found['idle']['cpu']
-    assert found['numbers']['calls'] == 0
+
+    def is_measured(document):
+        found = {each['name']: each for each in document['entities']}
+        assert found.keys() == {'busy', 'idle', 'numbers'}
+        assert found['numbers']['calls'] == 0
+        busy, idle = found['busy'], found['idle']
+        return document['has_cpu'] and idle['mean_ms'] and busy['cpu'] > 3 * idle['cpu']
+
+    document = look_until(is_measured, 'what they cost')
+    (idle,) = (each for each in document['entities'] if each['name'] == 'idle')
+    assert idle['mean_ms'] >= 20.0
 
 
 @pytest.mark.ros

@@ -17,7 +17,8 @@ pytest.importorskip('numpy')
 import numpy as np
 
 from composer.runtime.costs import lock_holders
-from composer.runtime.costs.call_meter import CallMeter
+from composer.runtime.costs.call_meter import CallMeter, call_meter
+from composer.runtime.costs.process_costs import ProcessMeter
 
 DATA = bytes(5_000_000)
 NUMBERS = list(range(50_000))
@@ -174,8 +175,24 @@ def test_where_the_lock_is_not_found_only_the_processor_is_measured(monkeypatch)
     monkeypatch.setattr(lock_holders, 'find_lock_field', lambda: None)
     meter = CallMeter()
     meter.turn(on=True)
-    meter.lap()
     loop()
     cpu_ns, held_ns = meter.lap()
     meter.turn(on=False)
     assert (cpu_ns > 0, held_ns, meter.sampled().elapsed_ns) == (True, 0, 0)
+    assert not meter.is_sampling
+
+
+@pytest.mark.parametrize(
+    ('program', 'begins'), [('import time; time.sleep(60)', True), ('', False)]
+)
+def test_samples_are_awaited_as_long_as_the_sampler_runs(tmp_path, monkeypatch, program, begins):
+    script = tmp_path / 'sampler.py'
+    script.write_text(program)
+    monkeypatch.setattr(lock_holders.lock_sampler, '__file__', str(script))
+    call_meter.turn(on=True)
+    try:
+        costs = ProcessMeter()
+        wait_until(lambda: costs.take(1.0).awaits_samples == begins, 'such costs')
+    finally:
+        call_meter.turn(on=False)
+    assert not call_meter.is_sampling
