@@ -21,6 +21,11 @@ CODE = """
     def fail(node):
         raise ValueError('no camera')
 
+    def fail_when_told(node):
+        while not os.path.exists('fail'):
+            time.sleep(0.01)
+        fail(node)
+
     def wait(node):
         print(f'{node.name} waits', flush=True)
         time.sleep(3600)

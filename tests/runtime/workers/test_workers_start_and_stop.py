@@ -64,7 +64,7 @@ def test_no_on_start_runs_before_all_nodes_of_all_workers_exist(compose):
 @pytest.mark.parametrize(
     ('behaviour', 'code', 'message'),
     [
-        ('fail', 1, "error: node 'bad': on_start raised ValueError('no camera')"),
+        ('fail_when_told', 1, "error: node 'bad': on_start raised ValueError('no camera')"),
         ('wait', 1, None),
     ],
 )
@@ -81,14 +81,16 @@ def test_an_on_start_in_a_worker_that_does_not_end_well_ends_the_start(
         ),
         CODE,
     )
+    # Only what has begun ends.
+    child.wait_for_line('home begins')
+    good = pid_of(child, 'good')
     if message is None:
         child.wait_for_line('bad waits')
-        good = pid_of(child, 'good')
         assert child.stop() == code
     else:
+        (compose.folder / 'fail').touch()
         assert child.wait() == code
         assert child.lines[-1] == message
-        good = pid_of(child, 'good')
     assert not child.matching(' ready in ')
     assert child.matching('good ends in')
     assert child.matching('home ends in')
