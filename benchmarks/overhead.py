@@ -21,7 +21,7 @@ from std_msgs.msg import Int32, String
 from composer.checks.checker import create_context
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime.behaviours.calls import BehaviourCall
 from composer.runtime.behaviours.running_calls import RunningCalls

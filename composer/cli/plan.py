@@ -19,8 +19,8 @@ from composer.language.values.start_reader import StartValueReader
 from composer.network.variables import ros_variables
 from composer.planning import json_document, text
 from composer.planning.differences import compare
-from composer.planning.snapshot import take_snapshot
 from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,7 +21,7 @@ from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
 from composer.planning.differences import compare, find_new_start
-from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.planning.text import render_plan
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.health.system_state import Outcome

@@ -22,7 +22,7 @@ from composer.language.values.start_reader import StartValueReader
 from composer.network.local_networks import wait_for_network
 from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
-from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path

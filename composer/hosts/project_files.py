@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from composer.confidential import list_lineage
 from composer.export.project import list_project_files
 from composer.hosts.wheels import Wheel, build_wheel, read_folder
-from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.python_source.module_finder import MissingModule
 from composer.records import record
 

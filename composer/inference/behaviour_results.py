@@ -24,7 +24,7 @@ from composer.inference.values import (
     is_none,
     join,
 )
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 
 if TYPE_CHECKING:
     from composer.inference.evaluation.evaluator import Evaluator

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
 from composer.inference.values import UNKNOWN, External, Primitive, Value
-from composer.python_source.modules import FunctionKind, ModuleSource
+from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import BLOCKS, list_children, list_nodes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from composer.inference.classes.attribute_stores import AttributeStore
+    from composer.python_source.function_kinds import FunctionKind
     from composer.python_source.module_finder import ModuleFinder
 
 _INSTALLED = {'site-packages', 'dist-packages'}

@@ -14,7 +14,6 @@ import pickle
 import queue
 import threading
 from contextlib import suppress
-from multiprocessing.connection import Connection
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -63,7 +62,8 @@ class Channel:
         functions: Functions,
         on_lost: Callable[[], object] = lambda: None,
     ) -> None:
-        self._connection = Connection(descriptor)
+        # A pickle says where it ends, so messages need no frames.
+        self._socket = os.fdopen(descriptor, 'rb')
         self._inode = os.fstat(descriptor).st_ino
         self._other = other
         self._functions = functions
@@ -112,7 +112,7 @@ class Channel:
     def is_intact(self) -> bool:
         """Whether its descriptor is still its own: a behaviour may have closed it."""
         try:
-            return os.fstat(self._connection.fileno()).st_ino == self._inode
+            return os.fstat(self._socket.fileno()).st_ino == self._inode
         except OSError:
             return False
 
@@ -121,14 +121,16 @@ class Channel:
         # If the other end has gone, `_listen` notices.
         with self._sending, suppress(OSError):
             if self.is_intact:
-                self._connection.send_bytes(data)
+                rest = memoryview(data)
+                while rest:
+                    rest = rest[os.write(self._socket.fileno(), rest) :]
                 return
         self._on_lost()
 
     def _listen(self) -> None:
-        with suppress(OSError, EOFError):
+        with suppress(OSError, EOFError, pickle.UnpicklingError):
             while True:
-                number, name, value = pickle.loads(self._connection.recv_bytes())  # noqa: S301 - our own process
+                number, name, value = pickle.load(self._socket)  # noqa: S301 - our own process
                 if name in (_RESULT, _ERROR):
                     if answer := self._answers.get(number):
                         answer.put((name, value))

@@ -7,7 +7,6 @@ import errno
 import faulthandler
 import os
 import resource
-import secrets
 import signal
 import subprocess
 import sys
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from composer.terminal import EscapingLogger
 
 _SIGEV_THREAD = 2
-_MARK_BITS = 62
+_MARK_BYTES = 7
 _POLL_SEC = 0.02
 
 
@@ -43,7 +42,7 @@ class GuardianClient:
 
     def __init__(self, stop_sec: float, exit_sec: float, *, owns_process: bool) -> None:
         self.owns_process = owns_process
-        self.mark = secrets.randbits(_MARK_BITS) if owns_process else 0
+        self.mark = int.from_bytes(os.urandom(_MARK_BYTES), 'big') if owns_process else 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._inode = os.fstat(self.descriptor).st_ino
         switch = _create_switch()

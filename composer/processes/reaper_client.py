@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 import threading
-import uuid
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +40,7 @@ class ReaperConnection:
         on_lost: Callable[[], None],
         folder: str,
     ) -> None:
-        self.mark = f'COMPOSER_SYSTEM_{uuid.uuid4().hex}'
+        self.mark = f'COMPOSER_SYSTEM_{os.urandom(16).hex()}'
         self._take_answer = take_answer
         self._on_lost = on_lost
         self._lock = threading.Lock()

@@ -8,7 +8,6 @@ import inspect
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ from composer.input_limits import (
     UnreadableFileError,
     read_file,
 )
+from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.local_names import nested_names, stored_names
 from composer.python_source.syntax import (
     BLOCKS,
@@ -38,20 +38,6 @@ if TYPE_CHECKING:
 # Longer lines of classes are not followed.
 MOST_BASES = 20
 _OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
-
-
-class FunctionKind(Enum):
-    """What a call of a function returns: a value, a generator or a coroutine."""
-
-    PLAIN = 'function'
-    GENERATOR = 'generator function'
-    COROUTINE = 'async function'
-    ASYNC_GENERATOR = 'async generator function'
-
-    @property
-    def is_generator(self) -> bool:
-        """Whether it yields."""
-        return self in (FunctionKind.GENERATOR, FunctionKind.ASYNC_GENERATOR)
 
 
 @record

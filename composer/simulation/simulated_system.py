@@ -15,7 +15,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
 from composer.language.pipeline import load_system_text
-from composer.planning.snapshot import take_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.behaviours.callables import project_on_path
 from composer.runtime.behaviours.import_check import import_behaviours

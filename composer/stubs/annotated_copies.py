@@ -12,7 +12,8 @@ import tokenize
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.python_source.modules import FunctionKind, FunctionSource
+from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.modules import FunctionSource
 from composer.records import record
 from composer.stubs.field_types import StubImports
 from composer.stubs.received_values import changed_names, payload_of

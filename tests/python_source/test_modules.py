@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.module_finder import MissingModule, ModuleFinder, project_search_path
-from composer.python_source.modules import FunctionKind, ModuleSource, read_module
+from composer.python_source.modules import ModuleSource, read_module
 
 
 @pytest.fixture

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from composer.entity_kinds import BehaviourKey
     from composer.language.bindings import Binding
     from composer.language.specs import BehaviourSpec
-    from composer.python_source.modules import FunctionKind, FunctionSource, ModuleSource
+    from composer.python_source.function_kinds import FunctionKind
+    from composer.python_source.modules import FunctionSource, ModuleSource
 
 # Modules of the standard library with functions that take anything, such as `print`.
 _TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'unittest')

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from composer.inference.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.python_source.annotations import Annotation, read_annotation
-from composer.python_source.modules import FunctionKind, ModuleSource
+from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

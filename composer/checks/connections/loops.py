@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.connections.cycles import find_cycles
-from composer.python_source.modules import FunctionKind, ModuleSource
+from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import always_answers
 from composer.records import record
 

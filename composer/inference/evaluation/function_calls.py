@@ -29,7 +29,8 @@ from composer.inference.values import (
     Value,
     join,
 )
-from composer.python_source.modules import FunctionKind, FunctionSource, read_signature
+from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.modules import FunctionSource, read_signature
 
 # How deep helpers of helpers are followed.
 _DEEPEST = 12

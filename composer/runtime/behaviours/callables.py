@@ -10,10 +10,10 @@ import traceback
 from contextlib import contextmanager
 from functools import partial
 from types import MethodType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import ComposerError
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 from composer.records import record
 from composer.runtime.behaviours.tracebacks import summarize
 
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from composer.language.specs import BehaviourSpec
+
+# How a function runs, and how it is called, where that can be known.
+Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
 
 
 class BehaviourImportError(ComposerError):
@@ -172,3 +175,12 @@ def _innermost_place(error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename:
         return f' ({error.filename}:{error.lineno})'
     return f' ({own[-1].filename}:{own[-1].lineno})' if len(own) > 1 else ''
+
+
+def shape_of(function: Callable[..., Any]) -> Shape:
+    """Return how a function runs, and how it is called."""
+    if isinstance(function, Method):
+        function = function.stand_in()
+    # What a wrapper returns may be something else than what it wraps.
+    kind = None if hasattr(function, '__wrapped__') else kind_of(function)
+    return kind, signature_of(function)

@@ -11,7 +11,7 @@ from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.executor.after_fork import end_child
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 from composer.runtime import forked_children
 from composer.runtime.behaviours.callables import kind_of
 

@@ -5,23 +5,19 @@ from __future__ import annotations
 import importlib.util
 import sys
 from contextlib import contextmanager, redirect_stdout
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_call
 from composer.language.bindings import system_bindings
 from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
-    import inspect
     from collections.abc import Callable, Iterable, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.bindings import Binding
     from composer.language.specs import SystemSpec
-    from composer.python_source.modules import FunctionKind
-
-Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
 
 _OF_ROS = ('rclpy', 'rcl_interfaces', 'builtin_interfaces', 'rosidl_runtime_py')
 _OF_ROS_ENDINGS = ('_msgs', '_srvs', '_interfaces')
@@ -40,7 +36,7 @@ def import_behaviours(
     functions: dict[str, Callable[..., Any]] = {}
     findings: list[Diagnostic] = []
     # Many nodes may have the same.
-    shapes: dict[str, Shape] = {}
+    shapes: dict[str, behaviours.Shape] = {}
     for binding in system_bindings(spec):
         behaviour = binding.behaviour
         if behaviour.name not in shapes:
@@ -49,7 +45,7 @@ def import_behaviours(
             except behaviours.BehaviourImportError as error:
                 findings.append(_explain(context, binding, error))
                 continue
-            shapes[behaviour.name] = shape_of(function)
+            shapes[behaviour.name] = behaviours.shape_of(function)
         findings += check_behaviour_call(context, binding, *shapes[behaviour.name])
     for binding, (first, second) in elsewhere:
         if isinstance(first, str):
@@ -98,16 +94,7 @@ class ImportCheck:
             elif not (was_told and isinstance(error.__cause__, ImportError)):
                 yield _explain(context, binding, error)
             return
-        yield from check_behaviour_call(context, binding, *shape_of(function))
-
-
-def shape_of(function: Callable[..., Any]) -> Shape:
-    """Return how a function runs, and how it is called."""
-    if isinstance(function, behaviours.Method):
-        function = function.stand_in()
-    # What a wrapper returns may be something else than what it wraps.
-    kind = None if hasattr(function, '__wrapped__') else behaviours.kind_of(function)
-    return kind, behaviours.signature_of(function)
+        yield from check_behaviour_call(context, binding, *behaviours.shape_of(function))
 
 
 def _explain(

@@ -6,7 +6,6 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
-from composer.planning.snapshot_data import encode_snapshot
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.control.protocol import VERSION
 from composer.runtime.health.system_state import Outcome
@@ -124,6 +123,9 @@ def top_answer(own: dict[str, Any] | None, workers: Mapping[str, dict[str, Any]]
 
 def snapshot_answer(snapshot: Snapshot) -> Outcome:
     """Return what a system runs as."""
+    # Few ask, and workers start faster without it.
+    from composer.planning.snapshot_data import encode_snapshot
+
     return _answer(encode_snapshot(snapshot))
 
 

@@ -13,7 +13,7 @@ from rclpy.action.server import RCLError
 from rclpy.qos import QoSProfile
 
 from composer.interfaces.classes import import_interface
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner, Progress

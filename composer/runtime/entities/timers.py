@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.clock import Clock, ClockType
 
 from composer.interfaces.classes import import_interface
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.messages.payloads import converter_for

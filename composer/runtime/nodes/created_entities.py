@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import KIND_OF_SECTION, TYPE_FOLDERS
 from composer.errors import ComposerError, StartError
-from composer.language.parsing.entity_parser import parse_entity
 from composer.runtime.messages.qos_profiles import is_qos_profile, write_policies
-from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -131,6 +129,9 @@ class EntityCreation:
         Raises:
             EntityError: Something is wrong with it, or the name is taken.
         """
+        # Few nodes create entities, and the others start faster without it.
+        from composer.schema.structure import find_problem
+
         node = self.node
         kind = KIND_OF_SECTION[section]
         asked = data.pop('name', None)
@@ -159,6 +160,8 @@ class EntityCreation:
         names: tuple[str | None, str],
         behaviour: Callable[..., Any] | None,
     ) -> CreatedEntity:
+        from composer.language.parsing.entity_parser import parse_entity
+
         entities = node.entities[section]
         asked, default_name = names
         # Those that are declared may not be there yet.

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from composer.records import record
 
 if TYPE_CHECKING:
-    import inspect
     from collections.abc import Collection, Mapping, Sequence
 
     from composer.language.specs import BehaviourSpec, WorkerSpec
     from composer.planning.snapshot import Snapshot
-    from composer.python_source.modules import FunctionKind
-
-# How a function runs, and how it is called.
-Shape: TypeAlias = 'tuple[FunctionKind | None, inspect.Signature | None]'
 
 
 @record

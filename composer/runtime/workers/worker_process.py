@@ -20,8 +20,11 @@ from composer.processes.guardian import tell
 from composer.processes.guardian_client import print_stacks_at_signal
 from composer.processes.reaper import LINK
 from composer.runtime import forked_children
-from composer.runtime.behaviours.callables import BehaviourImportError, import_behaviour
-from composer.runtime.behaviours.import_check import shape_of
+from composer.runtime.behaviours.callables import (
+    BehaviourImportError,
+    import_behaviour,
+    shape_of,
+)
 from composer.runtime.logs import log_levels
 from composer.runtime.rewiring.fresh_modules import fresh_modules
 from composer.runtime.workers.worker_system import WorkerSystem
@@ -33,9 +36,10 @@ if TYPE_CHECKING:
 
     from composer.language.specs import WorkerSpec
     from composer.planning.snapshot import Snapshot
+    from composer.runtime.behaviours.callables import Shape
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.rewiring.edit import Edit
-    from composer.runtime.workers.assignment import Assignment, ImportRequest, Shape
+    from composer.runtime.workers.assignment import Assignment, ImportRequest
 
 # As shells have it: 128 and the number of SIGTERM.
 _TERMINATED = 128 + signal.SIGTERM

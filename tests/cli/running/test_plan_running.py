@@ -13,8 +13,8 @@ from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.planning.differences import compare
-from composer.planning.snapshot import take_snapshot
 from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from tests.running import ROOT
 
 SYSTEM = """

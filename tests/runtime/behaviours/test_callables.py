@@ -4,7 +4,7 @@ from functools import partial, wraps
 
 import pytest
 
-from composer.python_source.modules import FunctionKind
+from composer.python_source.function_kinds import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
 
 

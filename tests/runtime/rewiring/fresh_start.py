@@ -72,7 +72,7 @@ def running_system(paths, *, checks=True):
     from composer.cli.common.system_reader import SystemReader, import_reading
     from composer.cli.reload import Reloader
     from composer.errors import ComposerError
-    from composer.planning.snapshot import take_snapshot
+    from composer.planning.snapshot_taking import take_snapshot
     from composer.processes.guardian_client import GuardianClient
     from composer.runtime.behaviours.callables import project_on_path
     from composer.runtime.environment import environment_set
