@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from contextlib import suppress
 from time import time_ns
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,15 @@ from composer.planning.snapshot_taking import take_snapshot
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
+from composer.runtime.environment import (
+    check_log_folder,
+    check_middleware,
+    check_ros,
+    check_shell,
+    environment_set,
+    find_colour,
+)
+from composer.runtime.workers.workers import Workers
 from composer.scenarios.recognition import is_scenario_file
 
 if TYPE_CHECKING:
@@ -35,6 +45,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.cli.reload import Reloader
     from composer.diagnostics import Diagnostic
+    from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
 
 
@@ -86,22 +97,14 @@ def up(  # noqa: PLR0913 - one for each option
     if ends_process:
         note_start()
     reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
+    workers = Workers(ros_arguments, log_levels)
     begun_ns = time_ns()
-    context, _files, told = reader.read()
+    context, _files, told = reader.read(loaded=lambda system: _spawn_early(workers, system))
     report = _show_errors if rehearses else show_findings
     report(told)
     if context is None or has_errors(told):
+        workers.kill_all()
         return ExitCode.FAILED
-    # These import nothing of ROS, which reads its environment when it is imported.
-    from composer.runtime.environment import (
-        check_log_folder,
-        check_middleware,
-        check_ros,
-        check_shell,
-        environment_set,
-        find_colour,
-    )
-
     check_ros()
     from composer.cli.reload import Reloader
 
@@ -115,6 +118,7 @@ def up(  # noqa: PLR0913 - one for each option
         return _run(
             context,
             lambda prefixes: Reloader(reader, context, prefixes, begun_ns, told),
+            workers,
             ros_arguments,
             log_levels,
             watches=watches,
@@ -143,6 +147,22 @@ def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
         return variables
 
 
+def _spawn_early(workers: Workers, system: LoadedSystem) -> None:
+    """Start the workers of a system while it is checked, if it is known what they start with."""
+    spec = system.spec
+    if spec is None or has_errors(system.diagnostics) or system.start.found:
+        return
+    if spec.host or spec.network or spec.interfaces:
+        return
+    # What is wrong is told when all is checked.
+    with suppress(ComposerError):
+        check_ros()
+        variables = ros_variables(spec)
+        variables |= shared_memory_variables(spec, {**os.environ, **variables})
+        with environment_set({**find_colour(), **variables}):
+            workers.spawn(spec)
+
+
 def _refuse_scenario(path: Path) -> None:
     if str(path) != '-' and is_scenario_file(path):
         message = f"'{path}' is a scenario file, which tests a system"
@@ -157,6 +177,7 @@ def _show_errors(findings: list[Diagnostic]) -> None:
 def _run(  # noqa: PLR0913 - as above
     context: CheckContext,
     create_reloader: Callable[[Sequence[Path]], Reloader],
+    workers: Workers,
     ros_arguments: Sequence[str],
     log_levels: Sequence[str],
     *,
@@ -170,8 +191,6 @@ def _run(  # noqa: PLR0913 - as above
     from composer.executor.after_fork import flush_output
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
-    from composer.runtime.environment import environment_set
-    from composer.runtime.workers.workers import Workers
 
     prefixes = import_declared(context.interfaces, lambda line: click.echo(line, err=True))
     with (
@@ -180,7 +199,6 @@ def _run(  # noqa: PLR0913 - as above
     ):
         report = _show_errors if rehearses else show_findings
         snapshot = take_snapshot(context, prefixes)
-        workers = Workers(ros_arguments, log_levels)
         workers.spawn(snapshot.spec)
         # It imports ROS, as the workers do meanwhile.
         from composer.runtime.run import run_system

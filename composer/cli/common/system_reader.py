@@ -7,7 +7,6 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from composer.checks.checker import check_in_context, create_context
 from composer.checks.ignore_comments import IgnoreComments
 from composer.cli.common.file_selection import create_loader
 from composer.cli.common.host_part import find_part
@@ -19,7 +18,6 @@ from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import list_named_files
 from composer.python_source.module_finder import project_search_path
 from composer.records import record
-from composer.runtime.behaviours.import_check import import_behaviours
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.bindings import Binding
+    from composer.language.loaded_system import LoadedSystem
     from composer.planning.snapshot import Snapshot
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.workers.workers import Workers
@@ -66,7 +65,9 @@ class SystemReader:
         return None if has_errors(findings) else context
 
     def read(
-        self, before: CheckContext | None = None
+        self,
+        before: CheckContext | None = None,
+        loaded: Callable[[LoadedSystem], object] = lambda _system: None,
     ) -> tuple[CheckContext | None, list[Path], list[Diagnostic]]:
         """Return a system, if there is one, the files that it names, and what is wrong with it.
 
@@ -74,6 +75,7 @@ class SystemReader:
 
         Args:
             before: What was read before: what is the same in it is kept.
+            loaded: Called before the system is checked, which takes longer than to read it.
 
         Raises:
             UsageError: The arguments do not fit the file, or nothing of it runs on the host.
@@ -82,6 +84,10 @@ class SystemReader:
         system_before = before.system if before else None
         load = create_loader(self.paths, self.words, self.set_values, system_before)
         system = load()
+        loaded(system)
+        # It is much code, which is read meanwhile.
+        from composer.checks.checker import check_in_context, create_context
+
         context = create_context(system, InterfaceCatalogue(), before)
         findings = check_in_context(system, context, host=self.host)
         if system.start.found and not has_errors(findings):
@@ -109,6 +115,7 @@ def import_reading(
         workers: Import those of their nodes; `None` if all are imported here.
         stale: The modules that workers execute anew.
     """
+    from composer.runtime.behaviours.import_check import import_behaviours
     from composer.runtime.rewiring.reading import Reading
 
     system = context.system

@@ -89,7 +89,7 @@ class Workers:
         return replace(reading, spec=snapshot.spec, snapshot=snapshot)
 
     def spawn(self, spec: SystemSpec) -> None:
-        """Start the processes of all workers of a system; those that run already go on.
+        """Start the processes of all workers of a system; those that run, or come, already go on.
 
         One that needs another process gets it beside the old one, which goes later.
 
@@ -97,7 +97,8 @@ class Workers:
             StartError: A process cannot be started.
         """
         for name in used_workers(spec) if self.are_used else ():
-            worker, before = spec.workers[name], self._workers.get(name)
+            worker = spec.workers[name]
+            before = self._coming.get(name) or self._workers.get(name)
             if before is None or needs_new_process(before.spec, worker):
                 functions = self._calls.functions_for(name)
                 self._coming[name] = new = Worker(worker, self._supervisor, functions)
