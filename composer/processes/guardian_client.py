@@ -7,6 +7,7 @@ import errno
 import faulthandler
 import os
 import resource
+import select
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _SIGEV_THREAD = 2
 _MARK_BYTES = 7
 _POLL_SEC = 0.02
+_GONE_SEC = 2.0
 
 
 class GuardianClient:
@@ -84,6 +86,17 @@ class GuardianClient:
         self._send(guardian.LEAVE)
         with suppress(OSError):
             os.close(self.descriptor)
+
+    def wait_until_gone(self) -> None:
+        """Let the guardian end, and wait for that: this process exits, and another one guards it.
+
+        What it has started and left is for that one, too.
+        """
+        if self._send(guardian.LEAVE):
+            # Nobody reads from the pipe any more.
+            poll = select.poll()
+            poll.register(self.descriptor, 0)
+            poll.poll(_GONE_SEC * 1000)
 
     def _send(self, byte: int, rest: bytes = b'') -> bool:
         # A behaviour may have closed it; then the guardian stops the system. Its number may be

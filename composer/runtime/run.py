@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -15,7 +16,12 @@ from composer.executor.after_fork import flush_output
 from composer.processes import own_process
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forked_children
-from composer.runtime.control.readiness import notify, notify_reload, take_notify_socket
+from composer.runtime.control.readiness import (
+    is_service,
+    notify,
+    notify_reload,
+    take_notify_socket,
+)
 from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
 from composer.runtime.stop import limit_stop
 from composer.runtime.stop_request import StopRequest
@@ -156,6 +162,8 @@ def _guarded(spec: SystemSpec, *, ends_process: bool) -> Iterator[GuardianClient
     finally:
         if ends_process:
             guardian.end_stop()
+            if is_service():
+                atexit.register(guardian.wait_until_gone)
         else:
             guardian.send_away()
 

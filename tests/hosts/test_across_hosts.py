@@ -111,9 +111,16 @@ def test_what_is_down_stays_down_until_it_is_deployed(project):
         0,
         'robot@front: nothing has changed\nrobot@rear: nothing has changed\n',
     )
+    begun = project.front.run('date', '+%s').stdout.strip()
     done = project.run('down')
     assert (done.returncode, done.stdout) == (0, 'robot@front: stopped\nrobot@rear: stopped\n')
     assert [state[0] for state, _ in project.states()] == ['inactive', 'inactive']
+    journal = ['journalctl', '--user', '--unit=composer-robot@*', f'--since=@{begun}', '-o', 'cat']
+    for host in (project.front, project.rear):
+        said = host.run(*journal).stdout
+        # All its processes have ended by themselves.
+        assert 'Stopped ' in said
+        assert 'SIGKILL' not in said
     done = project.run('ps')
     assert done.stdout.count('not running') == 2
     assert project.run('reload').returncode == 1

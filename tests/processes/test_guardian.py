@@ -240,3 +240,18 @@ started[0].communicate(b'.')
     )
     output, _ = process.communicate(timeout=DEADLINE_SEC)
     assert (process.returncode, output.splitlines()[-1]) == (0, 'None')
+
+
+def test_the_guardian_of_a_service_ends_before_it(compose):
+    """What is left when the main process has ended, systemd kills, and says so."""
+    code = "import os\n\nos.environ['SYSTEMD_EXEC_PID'] = str(os.getpid())\n\ndef tick(node):\n    pass\n"
+    system = "version: 1\nnodes: {n: {timers: {t: {period: 0.1, behaviour: 'parts:tick'}}}}\n"
+    child = compose(system, code)
+    child.wait_until_ready()
+    guarding = guardian_of(child)
+    assert is_alive(guarding)
+    child.send(signal.SIGTERM)
+    # Its output ends with the guardian.
+    code = child._process.wait(DEADLINE_SEC)
+    assert not is_alive(guarding)
+    assert code == 0

@@ -19,6 +19,16 @@ def take_notify_socket() -> str | None:
     return os.environ.pop(VARIABLE, None)
 
 
+def is_service() -> bool:
+    """Return whether this is the main process of a service of systemd.
+
+    That kills whatever is left of a service when its main process has ended, and the main process
+    if it does not end.
+    Source: https://www.freedesktop.org/software/systemd/man/latest/systemd.exec.html
+    """
+    return os.environ.get('SYSTEMD_EXEC_PID') == str(os.getpid())
+
+
 def notify_reload(address: str | None) -> None:
     """Tell that the system starts again, and will be up later."""
     stamp = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
