@@ -77,7 +77,7 @@ class WorkerSupervisor(ProcessSupervisor):
     def _after_end(self, run: ProcessRun, code: int) -> None:
         is_expected = run.process.is_leaving or self._stopping.is_set()
         # SIGTERM hurries those that have stopped already.
-        if is_expected and code in (ExitCode.DONE, -signal.SIGTERM):
+        if is_expected and (run.is_given_up or code in (ExitCode.DONE, -signal.SIGTERM)):
             return
         if not is_expected:
             self.on_end(run.process)

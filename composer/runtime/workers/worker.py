@@ -156,10 +156,15 @@ class Worker:
         self.leave()
         if not self.is_alive:
             return ExitCode.DONE, True
+        if not self.has_imported:
+            # It runs nothing yet, and does not answer before it has imported ROS.
+            self._supervisor.kill(self.process)
+            return ExitCode.DONE, True
         try:
             code, has_ended = self.call('stop', timeout_sec=timeout_sec)
         except ComposerError:
             self.print_stacks()
+            self._supervisor.kill(self.process)
             return ExitCode.FAILED, False
         run = self.process.run
         if run is not None:

@@ -89,7 +89,8 @@ class WorkerKeeper:
             try:
                 worker.begin_again()
             except ComposerError as error:
-                self.log.error(f"worker '{worker.name}' could not start again: {error}")
+                if not self.is_stopping:
+                    self.log.error(f"worker '{worker.name}' could not start again: {error}")
                 if worker.is_alive:
                     # Its end is one more, after which it is started again.
                     self.supervisor.kill(process)

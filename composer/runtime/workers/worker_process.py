@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.edit import Edit
     from composer.runtime.workers.assignment import Assignment, ImportRequest
 
-# As shells have it: 128 and the number of SIGTERM.
-_TERMINATED = 128 + signal.SIGTERM
+# Added to the number of a signal, as shells do.
+_BY_SIGNAL = 128
 _LONGEST_EXIT_SEC = 10.0
 _POLL_SEC = 0.5
 # Those of the system.
@@ -59,8 +59,9 @@ def main(name: str) -> None:
     print_stacks_at_signal()
     worker = WorkerProcess(name)
     # What a user or the kernel sends to this process alone: its nodes stop, and that is a failure.
-    forked_children.signal_handlers[signal.SIGTERM] = signal.SIG_DFL
-    signal.signal(signal.SIGTERM, worker.terminate)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        forked_children.signal_handlers[number] = signal.getsignal(number)
+        signal.signal(number, worker.terminate)
     worker.run()
 
 
@@ -76,6 +77,8 @@ class WorkerProcess:
         self._edit: Edit | None = None
         self._code = ExitCode.DONE
         self._ended = threading.Event()
+        self._stopping = threading.Lock()
+        self._stopped: tuple[int, bool] | None = None
         calls = (
             *(self.import_behaviours, self.keep_imports, self.drop_imports),
             *(self.create, self.run_on_start),
@@ -101,16 +104,26 @@ class WorkerProcess:
             sys.exit(self._code)
         os._exit(self._code)
 
-    def terminate(self, _number: int, _frame: FrameType | None) -> None:
-        """Handle SIGTERM."""
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        threading.Thread(target=self._end_by_itself, args=(_TERMINATED,), daemon=True).start()
+    def terminate(self, number: int, _frame: FrameType | None) -> None:
+        """Handle a signal that asks for the end."""
+        signal.signal(number, signal.SIG_DFL)
+        code = _BY_SIGNAL + number
+        threading.Thread(target=self._end_by_itself, args=(code,), daemon=True).start()
 
     def _end_by_itself(self, code: int) -> None:
-        if self._system is not None:
-            self._system.stop()
-        self._code = ExitCode.FAILED if code == ExitCode.DONE else code  # type: ignore[assignment]
-        self._ended.set()
+        system = self._system
+        if system is not None:
+            self._stop_nodes(system)
+        if system is None or not system.is_told_to_stop:
+            self._code = code  # type: ignore[assignment]
+            self._ended.set()
+
+    def _stop_nodes(self, system: WorkerSystem) -> tuple[int, bool]:
+        """Stop the nodes, once, though a signal and the system may ask for it at a time."""
+        with self._stopping:
+            if self._stopped is None:
+                self._stopped = system.stop()
+            return self._stopped
 
     def _on_lost(self) -> None:
         # Nothing of a system outlives its process.
@@ -201,7 +214,7 @@ class WorkerProcess:
             return ExitCode.DONE, True
         system.is_told_to_stop = True
         system.request_stop()
-        code, has_ended = system.stop()
+        code, has_ended = self._stop_nodes(system)
         self._end_soon()
         return code, has_ended
 

@@ -65,7 +65,7 @@ class WorkerWatch:
     def _ask(self, worker: Worker) -> None:
         with suppress(ComposerError):
             worker.call('ping')
-            if worker.is_silent:
+            if worker.is_silent and not self._ended.is_set():
                 self._log.info(f"worker '{worker.name}' answers again")
         worker.is_silent = False
         self._asked.pop(worker, None)

@@ -208,6 +208,7 @@ class Workers:
 
     def be_up(self) -> None:
         """Tell all workers that the system has started."""
+        self._supervisor.tell_ends()
         for worker in self._list():
             with suppress(ComposerError):
                 worker.channel.tell('be_up')

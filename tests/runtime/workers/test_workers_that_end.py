@@ -29,7 +29,8 @@ NODES = {
     'home': node('', *HEARS),
 }
 # One whose signal asks for its end stops its nodes first.
-SIGNALS = [signal.SIGKILL, signal.SIGSEGV, signal.SIGTERM]
+STOPS = [signal.SIGTERM, signal.SIGINT]
+SIGNALS = [signal.SIGKILL, signal.SIGSEGV, signal.SIGTERM, signal.SIGINT]
 
 
 @pytest.mark.parametrize('number', SIGNALS, ids=lambda each: each.name)
@@ -47,24 +48,39 @@ def test_a_worker_that_dies_is_started_again_and_the_others_run_on(compose, numb
     assert child.matching("worker 'left' has ended; its node is gone: '/talker'")
     assert child.matching("'/far' gets nothing on '/numbers'")
     assert child.matching("'/home' gets nothing on '/numbers'")
+    assert len(child.matching(f'talker ends in {before["talker"]}')) == (number in STOPS)
     assert child.stop() == 0
+    assert 'Traceback' not in child.output
+
+
+NEVER = 'restart: {when: never}'
+REQUIRED = f'{NEVER}, required: true'
+ENDS = "worker 'left' is required: the system ends"
 
 
 @pytest.mark.parametrize(
-    ('rules', 'line', 'code'),
+    ('rules', 'how', 'line', 'code'),
     [
-        ('restart: {when: never}', "worker 'left' was ended by SIGKILL", None),
-        (
-            'restart: {when: never}, required: true',
-            "worker 'left' is required: the system ends",
-            1,
-        ),
+        (NEVER, 'SIGKILL', "worker 'left' was ended by SIGKILL", None),
+        (REQUIRED, 'SIGKILL', ENDS, 1),
+        ('restart: {when: on_failure}', 0, "worker 'left' has ended with exit code 0", None),
+        (REQUIRED, 0, ENDS, 0),
     ],
 )
-def test_a_worker_that_is_not_started_again(compose, rules, line, code):
-    child = compose(system(NODES, f'workers: {{left: {{{rules}}}}}\n'), CODE)
+def test_a_worker_that_is_not_started_again(compose, rules, how, line, code):
+    leave = """
+    def leave(node):
+        if os.path.exists('leave'):
+            os._exit(0)
+    """
+    leaver = '{worker: left, timers: {t: {period: 0.05, behaviour: parts:leave}}}'
+    nodes = {**NODES, 'leaver': leaver}
+    child = compose(system(nodes, f'workers: {{left: {{{rules}}}}}\n'), CODE + leave)
     child.wait_until_ready()
-    os.kill(pid_of(child, 'talker'), signal.SIGKILL)
+    if how == 0:
+        (compose.folder / 'leave').touch()
+    else:
+        os.kill(pid_of(child, 'talker'), signal.Signals[how])
     child.wait_for_line(line)
     if code is None:
         assert is_there(pid_of(child, 'far'))
@@ -122,8 +138,53 @@ def test_a_worker_that_hangs_in_c_does_not_keep_the_system_from_its_end(compose)
     everyone = descendants(child.pid)
     assert child.stop() == 1
     assert child.matching('home ends in')
-    assert child.matching("worker 'left' did not end within")
+    assert child.matching("worker 'left' has not stopped in time")
     wait_until_gone(everyone)
+
+
+def test_a_worker_that_was_stopped_is_killed_at_the_stop_of_the_system(compose):
+    child = compose(system(NODES, 'executor: {shutdown_timeout: 1}\n'), CODE)
+    child.wait_until_ready()
+    everyone = descendants(child.pid)
+    os.kill(pid_of(child, 'talker'), signal.SIGSTOP)
+    assert child.stop() == 1
+    assert child.matching("worker 'left' has not stopped in time")
+    assert not child.matching('talker ends in')
+    wait_until_gone(everyone)
+
+
+def test_nodes_stop_once_though_a_signal_and_the_system_end_their_worker(compose):
+    slow = """
+    def end_slowly(node):
+        end(node)
+        time.sleep(0.5)
+    """
+    nodes = {**NODES, 'slow': '{worker: left, on_stop: parts:end_slowly}'}
+    child = compose(system(nodes), CODE + slow)
+    child.wait_until_ready()
+    os.kill(pid_of(child, 'talker'), signal.SIGTERM)
+    child.wait_for_line('slow ends in')
+    assert child.stop() == 0
+    assert len(child.matching('slow ends in')) == len(child.matching('talker ends in')) == 1
+
+
+def test_a_worker_that_is_being_started_again_keeps_nobody_from_the_stop(compose):
+    (compose.folder / 'slow.py').write_text("""
+import os, time
+if os.path.exists('slowly'):
+    print('imports', flush=True)
+    time.sleep(3600)
+def begin(node):
+    print(f'{node.name} begins in {os.getpid()}', flush=True)
+""")
+    nodes = {'bad': '{worker: left, on_start: slow:begin}', 'home': node('')}
+    child = compose(system(nodes, 'workers: {left: {restart: {delay: 0}}}\n'), CODE)
+    child.wait_until_ready()
+    (compose.folder / 'slowly').touch()
+    os.kill(pid_of(child, 'bad'), signal.SIGKILL)
+    child.wait_for_line('imports')
+    assert child.stop() == 0
+    assert not child.matching('could not start again')
 
 
 def test_workers_die_at_random_and_the_system_stays_whole(compose):
