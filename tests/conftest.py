@@ -66,7 +66,8 @@ def terminal(tmp_path):
 
     def tmux(*words):
         command = ['tmux', '-S', str(tmp_path / 'tmux'), '-f', '/dev/null', *words]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        # Without `LINES` and `COLUMNS`, which readline sets as pytest loads it: curses heeds them.
+        done = subprocess.run(command, env=os.environ, capture_output=True, text=True, check=True)
         return done.stdout
 
     yield tmux
