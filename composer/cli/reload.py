@@ -22,7 +22,7 @@ from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
 from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot_taking import take_snapshot
-from composer.planning.text import render_plan
+from composer.planning.text import STARTS_AGAIN, render_plan
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.health.system_state import Outcome
 
@@ -118,7 +118,7 @@ class Reloader:
         self._told.show(findings)
         text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}' if plan else _NO_CHANGE
         if system.starts_again:
-            text = f'the system starts again: {plan.summarize()}'
+            text = f'{STARTS_AGAIN}: {plan.summarize()}'
         if plan or not was_good:
             system_logger.info(text if plan else _GOOD_AGAIN)
         system.state.note_reload(Outcome(succeeded=True, text=text))

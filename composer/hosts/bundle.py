@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import UsageError
@@ -18,6 +19,9 @@ from composer.hosts.requirements import (
 from composer.hosts.wheels import build_composer_wheel
 from composer.network.servers import used_hosts
 from composer.network.variables import ros_variables
+from composer.planning.differences import keep_start
+from composer.planning.snapshot_data import encode_snapshot
+from composer.planning.snapshot_taking import take_snapshot
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -64,6 +68,8 @@ class Bundle:
 
     def _build(self, host: HostSpec, facts: Mapping[str, Any]) -> Part:
         spec = self._context.spec.on_host(host.name)
+        # A copy asks for the part; what was read stays read.
+        snapshot = take_snapshot(replace(self._context, spec=spec))
         python = facts['python']
         target = PlatformSpec((python[0], python[1]), facts['machine'], facts['libc'])
         required = [
@@ -77,10 +83,11 @@ class Bundle:
             host=host,
             files=self._files,
             words=self._words,
-            wheels=build_behaviours(self._context, spec, self._files),
+            wheels=build_behaviours(self._context, snapshot, self._files),
             required=provide_wheels(pin(required, target), target),
             composer=self._composer,
             variables=ros_variables(spec),
+            start=encode_snapshot(keep_start(snapshot)),
         )
         return build_part(sources, facts)
 

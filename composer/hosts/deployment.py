@@ -14,6 +14,7 @@ from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host
 from composer.hosts.moves import order_changes, settle_exchanges
 from composer.network.clock_skew import describe_skew, measure_skew
+from composer.planning.text import STARTS_AGAIN
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
@@ -50,6 +51,8 @@ class Deployment:
         self._agents = {host.name: HostAgent(host) for host in hosts}
         self._facts: dict[str, Mapping[str, Any]] = {}
         self._releases: dict[str, str] = {}
+        # The hosts whose part starts, or starts again.
+        self._starting: set[str] = set()
 
     async def __aenter__(self) -> Self:
         try:
@@ -164,20 +167,20 @@ class Deployment:
             for group in order_changes(list(changed.values()))
         ]
 
-        async def each(step: Callable[[HostAgent, HostPlan], Awaitable[_ResultT]]) -> None:
-            await self._each(lambda agent: step(agent, changed[agent.host.name]), agents)
+        async def each(step: Callable[[HostAgent], Awaitable[_ResultT]]) -> None:
+            await self._each(step, agents)
 
         try:
-            await each(self._prepare)
-            await each(lambda agent, _: agent.call('begin'))
+            await each(lambda agent: self._prepare(agent, changed[agent.host.name]))
+            await each(lambda agent: agent.call('begin'))
             for group in groups:
                 await self._each(
                     lambda agent: self._switch(agent, changed[agent.host.name]), group
                 )
             await each(self._hold)
-            await each(self._let_go)
+            await each(lambda agent: agent.call('let_go'))
             await each(self._wait_until_up)
-            await each(lambda agent, _: agent.call('confirm'))
+            await each(lambda agent: agent.call('confirm'))
         except BaseException as error:
             told = await asyncio.shield(self._roll_back(groups[::-1]))
             if not isinstance(error, ComposerError):
@@ -214,25 +217,28 @@ class Deployment:
         part, name = plan.part, agent.host.name
         release = self._releases[name]
         if plan.action == 'reload':
-            told = await agent.call(
-                'reload', release=release, name=part.name, timeout_sec=_RELOAD_SEC
+            told, starts_again = await agent.call(
+                'reload',
+                release=release,
+                name=part.name,
+                timeout_sec=_RELOAD_SEC,
+                new_start=STARTS_AGAIN,
             )
             for line in told.splitlines():
                 self._tell(f'{name}: {line.removeprefix(f"{part.name}: ")}')
+            if starts_again:
+                self._starting.add(name)
         else:
+            self._starting.add(name)
             self._tell(f'{name}: starting')
             await agent.call('switch', release=release, unit=part.unit, start=part.start)
 
-    async def _hold(self, agent: HostAgent, plan: HostPlan) -> None:
-        if plan.action != 'reload':
+    async def _hold(self, agent: HostAgent) -> None:
+        if agent.host.name in self._starting:
             await agent.call('wait_until_held', timeout_sec=_HELD_SEC)
 
-    async def _let_go(self, agent: HostAgent, plan: HostPlan) -> None:
-        if plan.action != 'reload':
-            await agent.call('let_go')
-
-    async def _wait_until_up(self, agent: HostAgent, plan: HostPlan) -> None:
-        if plan.action != 'reload':
+    async def _wait_until_up(self, agent: HostAgent) -> None:
+        if agent.host.name in self._starting:
             await agent.call('wait_until_up', timeout_sec=_UP_SEC)
             self._tell(f'{agent.host.name}: up')
 

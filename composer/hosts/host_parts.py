@@ -86,6 +86,7 @@ class PartSources:
         wheels: Those of the behaviours, by the folder that they are unpacked in.
         required: Wheels of what is required, by what they are of.
         variables: What the environment says of ROS.
+        start: What a system that runs starts again for, as `encode_snapshot` writes it.
     """
 
     spec: SystemSpec
@@ -96,6 +97,7 @@ class PartSources:
     required: Mapping[str, Path]
     composer: Wheel
     variables: Mapping[str, str]
+    start: Mapping[str, Any]
 
 
 def unit_of(system: str, host: HostSpec) -> str:
@@ -150,6 +152,7 @@ def build_part(sources: PartSources, facts: Mapping[str, Any]) -> Part:
         'packages': required,
         'composer': composer,
         'interfaces': sorted(spec.interfaces),
+        'start': sources.start,
         'runs': sorted([*spec.nodes, *(f'process {each}' for each in spec.processes)]),
         'unit_digest': hashlib.sha256(unit.encode()).hexdigest(),
     }

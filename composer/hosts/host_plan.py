@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.hosts.host_parts import UNIT_COMMENT
+from composer.planning.differences import find_new_start
+from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -143,6 +145,9 @@ def _decide(
         return 'restart', 'Composer changes'
     if old.get('interfaces') != new['interfaces']:
         return 'restart', 'its interface packages change'
+    if cause := find_new_start(decode_snapshot(old['start']), decode_snapshot(new['start'])):
+        keys = ' and '.join(sorted({each.key for each in cause.changes}))
+        return 'restart', f'{keys}: {cause.reason}'
     if facts['unit'] != part.unit:
         return 'restart', 'its unit changes'
     if any(old['files'].get(name) != new['files'][name] for name in _SCRIPTS):

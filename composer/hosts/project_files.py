@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 from composer.confidential import list_lineage
 from composer.export.project import list_project_files
 from composer.hosts.wheels import Wheel, build_wheel, read_folder
-from composer.planning.snapshot_taking import take_snapshot
 from composer.python_source.module_finder import MissingModule
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import SystemSpec
+    from composer.planning.snapshot import Snapshot
 
 _PYPROJECT = 'pyproject.toml'
 
@@ -66,14 +66,14 @@ def collect_files(given: Sequence[Path], named: Iterable[Path], spec: SystemSpec
 
 
 def build_behaviours(
-    context: CheckContext, part: SystemSpec, files: ProjectFiles
+    context: CheckContext, part: Snapshot, files: ProjectFiles
 ) -> dict[Path, Wheel]:
     """Return a wheel of the behaviours of a part for each folder that it imports modules from.
 
     A wheel has whole packages, with their data, and of those only what the part imports.
     """
     tops: dict[Path, dict[str, Path]] = {}
-    for name in _list_modules(context, part):
+    for name in filter(context.modules.is_of_project, part.code):
         found = context.modules.find(name)
         if isinstance(found, MissingModule) or found.path is None:
             continue
@@ -86,14 +86,6 @@ def build_behaviours(
         folder: build_wheel(_wheel_name(files, folder), _read(found, folder))
         for folder, found in tops.items()
     }
-
-
-def _list_modules(context: CheckContext, part: SystemSpec) -> Iterator[str]:
-    # A copy asks for the part; what was read stays read.
-    from dataclasses import replace
-
-    code = take_snapshot(replace(context, spec=part)).code
-    return (name for name in code if context.modules.is_of_project(name))
 
 
 def _read(found: Mapping[str, Path], folder: Path) -> dict[str, bytes]:

@@ -41,6 +41,17 @@ def ros_variables(spec: SystemSpec) -> dict[str, str]:
     return {**found, **spec.environment}
 
 
+def find_sought(spec: SystemSpec) -> dict[str, str]:
+    """Return the addresses at which the part of a host looks for other hosts, by their names."""
+    network = spec.network
+    if network is None or not spec.host or network.discovery == 'multicast':
+        return {}
+    others = {host.name: host.address for host in spec.hosts.values() if host.name != spec.host}
+    if network.discovery == 'peers':
+        return others
+    return {name: address for name, address in others.items() if name == network.server}
+
+
 def clear_others(variables: Mapping[str, str], shell: Mapping[str, str]) -> dict[str, str]:
     """Return the variables, with empty ones for what the shell says of discovery besides.
 
@@ -80,7 +91,7 @@ def _multicast(_spec: SystemSpec, network: NetworkSpec) -> dict[str, str]:
 
 def _peers(spec: SystemSpec, network: NetworkSpec) -> dict[str, str]:
     # The range is that of discovery without peers: on this host.
-    others = [host.address for host in spec.hosts.values() if host.name != spec.host]
+    others = find_sought(spec).values()
     return {RANGE: 'LOCALHOST', **_peers_variable([*others, *network.peers])}
 
 

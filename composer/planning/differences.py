@@ -21,10 +21,13 @@ from composer.language.specs import (
     WorkerSpec,
 )
 from composer.names import expand_name, remap_name
+from composer.network.variables import find_sought
 from composer.planning.changes import Reading, compare_entries, compare_fields
 from composer.planning.notes import with_notes
 from composer.planning.plan import Action, Change, Operation, Plan
+from composer.planning.snapshot import Snapshot
 from composer.records import record
+from composer.yaml_text.positions import SourceMap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -34,7 +37,6 @@ if TYPE_CHECKING:
     from composer.language.bindings import Binding
     from composer.language.specs import SystemSpec
     from composer.planning.plan import Target
-    from composer.planning.snapshot import Snapshot
 
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
@@ -177,6 +179,13 @@ def find_new_start(old: Snapshot, new: Snapshot) -> Operation | None:
     return next((each for each in found if each.action is Action.RECREATE), None)
 
 
+def keep_start(snapshot: Snapshot) -> Snapshot:
+    """Return what `find_new_start` compares: nothing of nodes, processes and workers."""
+    spec = replace(snapshot.spec, nodes={}, processes={}, workers={})
+    positions = SourceMap(snapshot.positions.source)
+    return Snapshot(spec, positions, {}, {}, snapshot.definitions, {})
+
+
 class _Comparison:
     def __init__(self, old: Snapshot, new: Snapshot) -> None:
         self._old, self._new = old, new
@@ -256,7 +265,7 @@ class _Comparison:
     def compare_system(self) -> Iterator[Operation]:
         old, new = self._reading(self._old), self._reading(self._new)
         changes = [*compare_fields(old, new, _OF_THE_SYSTEM), *self._changed_packages(old, new)]
-        for key, values in (('network', _network_of), ('hosts', _addresses_of)):
+        for key, values in (('network', _network_of), ('hosts', find_sought)):
             changes += compare_entries(
                 old, new, key, *(values(each.record) for each in (old, new))
             )
@@ -517,11 +526,6 @@ def _network_of(spec: SystemSpec) -> dict[str, Any]:
     return {
         key: each for key, each in given.items() if each not in (None, '', ()) and key != 'path'
     }
-
-
-def _addresses_of(spec: SystemSpec) -> dict[str, str]:
-    """Return the addresses at which the part of a host looks for the others."""
-    return {host.name: host.address for host in spec.hosts.values()} if spec.host else {}
 
 
 def _name(spec: Any) -> str:

@@ -29,6 +29,8 @@ _VERBS = {
     Action.REMOVE: 'to remove',
 }
 _LONGEST_VALUE = 60
+# What a system says to an edit that it cannot take while it runs.
+STARTS_AGAIN = 'the system starts again'
 
 
 def render_plan(plan: Plan, *, colour: bool = False) -> str:

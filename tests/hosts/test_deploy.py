@@ -43,6 +43,7 @@ def test_one_changed_file_goes_over_and_the_system_runs_on(project):
     project.hears('good day')
     assert project.pids() == pids
     project.edit('behaviours/talk.py', 'good day', 'hello')
+    project.edit('hosts.yaml', 'address: front', 'address: front, description: of the cab')
     project.deploy()
     project.hears('hello')
     assert project.pids() == pids

@@ -128,12 +128,13 @@ def test_the_document_is_as_its_schema_says(plan, name):
     assert kinds.get('worker') is None
 
 
-def test_the_part_of_a_host_starts_anew_when_an_address_changes(tmp_path):
+def test_the_part_of_a_host_starts_anew_when_an_address_it_looks_for_changes(tmp_path):
     snapshots = []
     for address in ('10.0.0.2', '10.0.0.3'):
         path = tmp_path / 'robot.yaml'
         path.write_text(
-            f'version: 1\nhosts: {{a: {{address: {address}}}}}\nnodes: {{n: {{host: a}}}}'
+            f'version: 1\nnetwork: peers\nhosts: {{a: {{address: a}}, b: {{address: {address}}}}}\n'
+            'nodes: {n: {host: a}}'
         )
         system = load_system(path)
         whole = Snapshot(system.spec, system.positions, {}, {}, {}, {})
@@ -141,7 +142,7 @@ def test_the_part_of_a_host_starts_anew_when_an_address_changes(tmp_path):
         snapshots.append((whole, part))
     (whole, part), (new_whole, new_part) = snapshots
     assert not compare(whole, new_whole)
-    assert find_new_start(part, new_part).changes[0].key == 'hosts.a'
+    assert find_new_start(part, new_part).changes[0].key == 'hosts.b'
 
 
 def test_a_system_with_workers_and_hosts_is_described_in_full(tmp_path):

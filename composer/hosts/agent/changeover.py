@@ -79,6 +79,7 @@ class Transaction:
         }
         write_json(self._store.root / _BEFORE, before)
         write_link(self._store.pending, read_link(self._store.current) or NOTHING)
+        self._service.note_restarts()
 
     def switch(self, release: str, unit: str, start: str) -> None:
         """Let a release start in place of the one that runs; it is held.
@@ -129,11 +130,23 @@ class Transaction:
         time.sleep(_SETTLE_SEC)
         self._service.check_start(self._service.state())
 
-    def reload(self, release: str, name: str, timeout_sec: float) -> str:
-        """Let the system that runs become what a release says; return what it says to that."""
+    def reload(self, release: str, name: str, timeout_sec: float, new_start: str) -> list[Any]:
+        """Let the system that runs become what a release says.
+
+        If it starts again for that, it is held.
+
+        Args:
+            new_start: What it says then.
+
+        Returns:
+            What it says, and whether it starts again.
+        """
         self._release, self._reloads = release, True
+        write_file(self.hold, b'')
         self._store.choose(release)
-        return self._reload(name, timeout_sec)
+        told = self._reload(name, timeout_sec)
+        self._reloads = new_start not in told
+        return [told, not self._reloads]
 
     def _reload(self, name: str, timeout_sec: float) -> str:
         command = [str(self._store.live / 'composer'), 'reload', name]
@@ -162,6 +175,7 @@ class Transaction:
             return 'nothing was changed'
         has_changed = read_link(self._store.current) != before['release']
         if self._service.is_active() and (self._reloads or not has_changed):
+            self.hold.unlink(missing_ok=True)
             self._go_back_to(before)
             manifest = self._store.manifest() or {}
             with suppress(HostError):

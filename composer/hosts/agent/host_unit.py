@@ -30,6 +30,7 @@ class Service:
         self.name = name
         self.abandoned = threading.Event()
         self._begun = 0
+        self._restarts = '0'
         self.is_user = scope == 'user'
         self._words = ['--user'] if self.is_user else []
         runtime = f'/run/user/{os.getuid()}'
@@ -105,9 +106,14 @@ class Service:
 
     def begin(self) -> None:
         """Let it start; return before it has."""
-        self._begun = int(time.time())
+        self._begun, self._restarts = int(time.time()), '0'
         self._run('reset-failed', '--', self.name, checks=False)
         self._run('start', '--no-block', '--', self.name)
+
+    def note_restarts(self) -> None:
+        """Note that it runs, and how often it has been started again before."""
+        self._begun = int(time.time())
+        self._restarts = self.state()['NRestarts'] or '0'
 
     def stop(self) -> None:
         """Stop it, and wait until it has stopped."""
@@ -142,7 +148,7 @@ class Service:
             raise HostError(message)
         if _has_succeeded(state):
             return
-        has_restarted = state['NRestarts'] not in ('', '0')
+        has_restarted = state['NRestarts'] not in ('', self._restarts)
         has_ended = state['ActiveState'] in ('failed', 'inactive', 'deactivating')
         if has_restarted or has_ended or state['SubState'] == 'auto-restart':
             message = 'the system did not start'
