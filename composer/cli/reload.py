@@ -181,6 +181,8 @@ class Reloader:
             fresh_modules(stale, snapshot.sources, search_path) as import_rest,
             workers.importing(),
         ):
+            crossing = {each.rule for each in findings}
+            workers.give_room(snapshot.spec, sends_big='big-crossing-message' in crossing)
             workers.spawn(snapshot.spec)
 
             def import_all() -> Reading | None:

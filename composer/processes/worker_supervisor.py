@@ -18,7 +18,7 @@ from composer.processes.external_process import ExternalProcess
 from composer.processes.supervisor import Launch, ProcessSupervisor, Tools
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from composer.language.specs import WorkerSpec
     from composer.processes.channel import Functions
@@ -53,6 +53,7 @@ class WorkerSupervisor(ProcessSupervisor):
 
     Attributes:
         on_end: Called with each process of a worker that has ended though nobody asked for that.
+        variables: Environment variables of all workers, beside those of Composer.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class WorkerSupervisor(ProcessSupervisor):
         super().__init__((), logger, end_system, timeout_sec)
         self._noun, self._all = 'worker', 'all workers'
         self.on_end: Callable[[ExternalProcess], None] = lambda _process: None
+        self.variables: Mapping[str, str] = {}
 
     def _prepare(self, process: ExternalProcess, _tools: Tools) -> Launch:
         assert isinstance(process, ConnectedProcess)  # noqa: S101 - it starts no others
@@ -71,7 +73,7 @@ class WorkerSupervisor(ProcessSupervisor):
         output_ended = threading.Event()
         output_ended.set()
         descriptors = [os.dup(1), os.dup(2), other.detach()]
-        environment = {**os.environ, **spec.env}
+        environment = {**os.environ, **self.variables, **spec.env}
         return Launch(spec.command, environment, None, output_ended, descriptors)
 
     def _after_end(self, run: ProcessRun, code: int) -> None:

@@ -26,6 +26,9 @@ CODE = """
         node.state.count += 1
         return {'data': f'{node.state.count} ' + 'x' * 1_200_000}
 
+    def ignore(node, picture):
+        pass
+
     def see(node, image):
         number = int(image.data.split()[0])
         node.state.numbers.append(number)
@@ -34,9 +37,7 @@ CODE = """
             node.state.has_told = True
             print(f'{node.name} has {len(numbers)}, most', flush=True)
 """
-CAMERA = """
-version: 1
-nodes:
+CAMERA_NODES = """
   camera:
     worker: vision
     state: {count: 0}
@@ -47,6 +48,15 @@ nodes:
     state: {numbers: [], has_told: false}
     subscriptions:
       image: {type: std_msgs/msg/String, topic: image, qos: sensor_data, behaviour: parts:see}
+"""
+CAMERA = f'version: 1\nnodes:{CAMERA_NODES}'
+EYE = """
+version: 1
+nodes:
+  eye: {publishers: {seen: {type: sensor_msgs/msg/Image, topic: seen}}}
+"""
+HEARS_EYE = """
+      seen: {type: sensor_msgs/msg/Image, topic: seen, behaviour: parts:ignore}
 """
 
 
@@ -122,9 +132,13 @@ def test_the_room_that_is_checked_is_what_the_profile_takes():
 
 
 @pytest.mark.ros
-def test_large_messages_of_best_effort_cross_between_workers(compose):
-    child = compose(CAMERA, CODE)
+@pytest.mark.parametrize('are_added', [False, True], ids=['at the start', 'by an edit'])
+def test_large_messages_of_best_effort_cross_between_workers(compose, are_added):
+    child = compose(EYE if are_added else CAMERA, CODE, '--watch')
     child.wait_until_ready()
+    if are_added:
+        compose.write(f'{EYE}{CAMERA_NODES}{HEARS_EYE}', CODE)
+        child.wait_for_line('network: the process of the system has little shared memory')
     line = child.wait_for_line('detector has')
     assert child.stop() == 0
     # The first that arrives, and 39 more were sent.

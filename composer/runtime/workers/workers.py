@@ -6,6 +6,7 @@ import it at the same time.
 
 from __future__ import annotations
 
+import os
 import queue
 import sys
 import threading
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.bindings import system_bindings
+from composer.network.transport_profile import shared_memory_variables
 from composer.runtime.workers.assignment import Assignment, ImportRequest
 from composer.runtime.workers.at_once import ANSWER_SEC, ask_all, do_at_once
 from composer.runtime.workers.system_calls import SystemCalls
@@ -87,6 +89,26 @@ class Workers:
             return reading
         snapshot = part_of(reading.snapshot, '')
         return replace(reading, spec=snapshot.spec, snapshot=snapshot)
+
+    def give_room(self, spec: SystemSpec, *, sends_big: bool) -> None:
+        """Have the first workers, if an edit brings them, get large segments of shared memory.
+
+        Args:
+            sends_big: Whether big messages cross.
+        """
+        if self._workers or not (self.are_used and used_workers(spec)):
+            return
+        try:
+            self._supervisor.variables = shared_memory_variables(spec, os.environ)
+        except ComposerError as error:
+            self._keeper.log.warning(f'network: {error}')
+            return
+        if self._supervisor.variables and sends_big:
+            self._keeper.log.warning(
+                'network: the process of the system has little shared memory until the system '
+                'starts again: what its nodes send to workers in messages of more than 512 KB '
+                'goes over UDP, where it may be lost'
+            )
 
     def spawn(self, spec: SystemSpec) -> None:
         """Start the processes of all workers of a system; those that run, or come, already go on.
