@@ -163,7 +163,7 @@ def find_marked(mark: int) -> dict[int, str]:
         folder = Path('/proc', name)
         # It may have ended, or belong to another user.
         with contextlib.suppress(OSError, ValueError):
-            if int(name) == os.getpid() or _read_mark(folder) != mark:
+            if int(name) == os.getpid() or read_mark(folder) != mark:
                 continue
             command = (folder / 'cmdline').read_bytes()
             if not _is_dead(folder) and _SPARED not in command:
@@ -178,8 +178,13 @@ def _describe(command: bytes) -> str:
     return text if len(text) <= _LONGEST_COMMAND else f'{text[:_LONGEST_COMMAND]}...'
 
 
-def _read_mark(folder: Path) -> int:
-    """Return the limit of file locks; raise `ValueError` if there is none."""
+def read_mark(folder: Path) -> int:
+    """Return the mark of a process, in its folder of `/proc`.
+
+    Raises:
+        OSError: The process has gone.
+        ValueError: It has no limit of file locks.
+    """
     _, _, rest = (folder / 'limits').read_text().partition('Max file locks')
     return int(rest.split()[0])
 
@@ -188,15 +193,19 @@ def _is_dead(folder: Path) -> bool:
     return (folder / 'stat').read_bytes().rpartition(b')')[2].split()[0] in {b'Z', b'X'}
 
 
-def kill_marked(mark: int) -> None:
-    """Kill all processes that bear a mark until there are no more, and print which."""
+def kill_marked(mark: int, whose: str = 'the system') -> None:
+    """Kill all processes that bear a mark until there are no more, and print which.
+
+    Args:
+        whose: What they have outlived.
+    """
     told: set[int] = set()
     deadline = time.monotonic() + _KILL_SEC
     while (found := find_marked(mark)) and time.monotonic() < deadline:
         for pid, command in found.items():
             if pid not in told:
                 told.add(pid)
-                tell(f'[WARN] [composer]: process {pid} ({command}) outlived the system: killed')
+                tell(f'[WARN] [composer]: process {pid} ({command}) outlived {whose}: killed')
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
         time.sleep(_POLL_SEC)

@@ -44,16 +44,17 @@ class GuardianClient:
 
     def __init__(self, stop_sec: float, exit_sec: float, *, owns_process: bool) -> None:
         self.owns_process = owns_process
-        self.mark = int.from_bytes(os.urandom(_MARK_BYTES), 'big') if owns_process else 0
+        self.mark = 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._inode = os.fstat(self.descriptor).st_ino
         switch = _create_switch()
         print_stacks_at_signal()
+        mark = _create_mark() if owns_process else 0
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own script
                 [
                     *(sys.executable, '-I', '-S', guardian.__file__),
-                    *map(str, (os.getpid(), reports, switch, stop_sec, exit_sec, self.mark)),
+                    *map(str, (os.getpid(), reports, switch, stop_sec, exit_sec, mark)),
                 ],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -62,8 +63,8 @@ class GuardianClient:
             )
         finally:
             os.close(reports)
-        if self.mark:
-            self._set_mark()
+        if mark and _set_mark(mark):
+            self.mark = mark
 
     def wait_until_begun(self) -> None:
         """Wait until the guardian is no child of this process any more."""
@@ -109,14 +110,6 @@ class GuardianClient:
             return error.errno != errno.EBADF
         return True
 
-    def _set_mark(self) -> None:
-        _, hard = resource.getrlimit(guardian.RLIMIT_LOCKS)
-        try:
-            resource.setrlimit(guardian.RLIMIT_LOCKS, (self.mark, hard))
-        except (OSError, ValueError):
-            # The limit of this process is lower already.
-            self.mark = 0
-
 
 class NoGuardian:
     """Stands for a guardian where something else ends a process that hangs.
@@ -136,6 +129,26 @@ class NoGuardian:
     def begin_stop(self) -> bool:
         """Tell that the stop goes on."""
         return True
+
+
+def _create_mark() -> int:
+    return int.from_bytes(os.urandom(_MARK_BYTES), 'big')
+
+
+def mark_process() -> int:
+    """Mark this process, and all that it starts from now on; return the mark, 0 for none."""
+    mark = _create_mark()
+    return mark if _set_mark(mark) else 0
+
+
+def _set_mark(mark: int) -> bool:
+    _, hard = resource.getrlimit(guardian.RLIMIT_LOCKS)
+    try:
+        resource.setrlimit(guardian.RLIMIT_LOCKS, (mark, hard))
+    except (OSError, ValueError):
+        # The limit of this process is lower already.
+        return False
+    return True
 
 
 def _find_marked(mark: int) -> dict[int, str]:

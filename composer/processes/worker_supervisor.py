@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from composer.errors import ExitCode
 from composer.language.specs import DEFAULT_RESTART_DELAY_SEC, ProcessSpec
 from composer.processes.channel import Channel
 from composer.processes.external_process import ExternalProcess
+from composer.processes.guardian import kill_marked, read_mark
 from composer.processes.supervisor import Launch, ProcessSupervisor, Tools
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ class ConnectedProcess(ExternalProcess):
     Attributes:
         channel: The connection to its last run; `None` before the first.
         functions: What the worker may call.
+        mark: What marks the processes that its behaviours start, once it is up; 0 for nothing.
     """
 
     def __init__(self, spec: WorkerSpec, functions: Functions) -> None:
@@ -42,6 +45,13 @@ class ConnectedProcess(ExternalProcess):
         super().__init__(worker_rules(spec, is_up=False))
         self.channel: Channel | None = None
         self.functions = functions
+        self.mark = 0
+
+    def learn_mark(self) -> None:
+        """Learn how its process has marked itself."""
+        if self.run is not None:
+            with suppress(OSError, ValueError):
+                self.mark = read_mark(Path(f'/proc/{self.run.pid}'))
 
 
 class WorkerSupervisor(ProcessSupervisor):
@@ -83,7 +93,15 @@ class WorkerSupervisor(ProcessSupervisor):
             return
         if not is_expected:
             self.on_end(run.process)
+        self._end_marked(run.process)
         super()._after_end(run, code)
+
+    @staticmethod
+    def _end_marked(process: ExternalProcess) -> None:
+        """Kill what behaviours of a worker have started that has ended by itself."""
+        if isinstance(process, ConnectedProcess) and process.mark:
+            mark, process.mark = process.mark, 0
+            kill_marked(mark, f"worker '{process.spec.name}'")
 
 
 def worker_rules(spec: WorkerSpec, *, is_up: bool = True) -> ProcessSpec:

@@ -11,6 +11,7 @@ pytest.importorskip('rclpy')
 
 from composer.processes import guardian
 from tests.running import DEADLINE_SEC, ROOT
+from tests.runtime.workers.observed import descendants
 
 pytestmark = pytest.mark.ros
 
@@ -58,6 +59,8 @@ def start(node, deaf=False):
 """
 STARTED = 6
 STARTING = 'version: 1\nexecutor: {{shutdown_timeout: {}}}\nnodes: {{n: {{on_start: {}}}}}\n'
+# In the process of the system, or in one of its own.
+PLACES = pytest.mark.parametrize('worker', ['', 'worker: w, '], ids=['system', 'worker'])
 HOLDING = """
 version: 1
 executor: {shutdown_timeout: 0.5}
@@ -78,6 +81,12 @@ def is_alive(pid):
     except FileNotFoundError:
         return False
     return state != 'Z'
+
+
+def worker_of(child):
+    """Return the process of the only worker of a system; those that it forks come after it."""
+    commands = {pid: Path(f'/proc/{pid}/cmdline').read_bytes() for pid in descendants(child.pid)}
+    return next(pid for pid, each in commands.items() if b'worker_program.py' in each)
 
 
 def guardian_of(child):
@@ -162,8 +171,9 @@ def stack_of(pid):
     )
 
 
-def test_processes_of_behaviours_end_with_the_system(compose):
-    child = compose(STARTING.format(30, 'parts:start'), CODE)
+@PLACES
+def test_processes_of_behaviours_end_with_the_system(compose, worker):
+    child = compose(STARTING.format(30, 'parts:start').replace('on_', f'{worker}on_'), CODE)
     pids = started_by(child)
 
     assert child.stop() == 0
@@ -174,14 +184,16 @@ def test_processes_of_behaviours_end_with_the_system(compose):
     assert not child.matching('resource_tracker')
 
 
-def test_processes_of_behaviours_that_do_not_end_are_killed(compose):
+@PLACES
+def test_processes_of_behaviours_that_do_not_end_are_killed(compose, worker):
     start = "{behaviour: 'parts:start', with: {deaf: true}}"
-    child = compose(STARTING.format(0.5, start), CODE)
+    child = compose(STARTING.format(0.5, start).replace('on_', f'{worker}on_'), CODE)
     pids = started_by(child)
 
     assert child.stop() == 1
     assert not any(map(is_alive, pids))
-    assert len(child.matching(' outlived the system: killed')) == 3
+    # The others may be too slow on a busy machine.
+    assert len(child.matching(' outlived the system: killed')) >= 3
 
 
 def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_for):
@@ -192,6 +204,18 @@ def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_
     wait_for(lambda: not any(map(is_alive, pids)), 'their end')
     for pid in pids:
         assert child.wait_for_line(f'process {pid} (').endswith(' outlived the system: killed')
+
+
+def test_processes_of_behaviours_end_with_a_worker_that_is_killed(compose, wait_for):
+    text = STARTING.format(30, 'parts:start').replace('on_', 'worker: w, on_')
+    child = compose(text, CODE)
+    pids = started_by(child)
+    os.kill(worker_of(child), signal.SIGKILL)
+
+    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
+    for pid in pids:
+        assert child.wait_for_line(f'process {pid} (').endswith(" outlived worker 'w': killed")
+    assert child.stop() == 0
 
 
 def test_a_system_does_without_its_guardian(compose, wait_for):

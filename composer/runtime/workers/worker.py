@@ -146,6 +146,7 @@ class Worker:
     def keep_to_rules(self) -> None:
         """Have its process started again as the file says."""
         self.process.change(worker_rules(self.spec))
+        self.process.learn_mark()
 
     def stop(self, timeout_sec: float) -> tuple[int, bool]:
         """Stop its nodes and end its process.

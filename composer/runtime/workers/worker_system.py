@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.processes.guardian_client import NoGuardian
+from composer.processes.guardian_client import NoGuardian, mark_process
 from composer.records import record
 from composer.runtime.control.control_node import ControlNode
 from composer.runtime.health.introductions import Introductions
@@ -98,6 +98,8 @@ class _Keeper(NoGuardian):
     def __init__(self, channel: Channel) -> None:
         super().__init__(owns_process=True)
         self._channel = channel
+        # What its behaviours start ends with the worker.
+        self.mark = mark_process()
 
     def begin_stop(self) -> bool:
         """Return whether the descriptors of this process are still its own."""
