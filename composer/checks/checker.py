@@ -35,6 +35,7 @@ from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
 from composer.checks.placement.crossing_messages import check_crossing_messages
 from composer.checks.placement.hosts_and_workers import check_hosts, check_workers
+from composer.checks.placement.inventory import check_inventory, check_network_keys
 from composer.checks.placement.network_paths import check_network
 from composer.checks.placement.processes_elsewhere import check_processes_elsewhere
 from composer.checks.placement.shared_objects import check_shared_objects
@@ -99,9 +100,11 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_awaited_states,
     check_environment,
     check_hosts,
+    check_inventory,
     check_workers,
     check_processes_elsewhere,
     check_network,
+    check_network_keys,
     check_channel_types,
     check_servers,
     check_qos_pairs,

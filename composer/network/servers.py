@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from dataclasses import replace
 from types import MappingProxyType
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
 
 # How each process finds the others by way of one host.
 SERVED = ('discovery_server', 'zenoh')
-# A host that others look for here is looked for on their own computers.
-LOOPBACK = re.compile(r'localhost|127(\.\d{1,3}){3}|::1')
 _PROGRAM = 'composer.network.discovery_server'
 
 

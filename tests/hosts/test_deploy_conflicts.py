@@ -74,7 +74,7 @@ def test_a_unit_of_somebody_else_is_not_overwritten(project):
             'front.python=/bin/false': "'/bin/false' to run Composer, which did not answer",
             'rear.python=/home/robot/chatty': 'It printed: hello from bashrc',
         },
-        {'front.systemd=system': 'host front: units of the system are for root'},
+        {'front.systemd=system': "for root, and the user of 'front' is not named"},
         {'front.folder=/home/robot/small': 'its disk has 21 MB'},
         {'front.folder=/home/robot/narrow': 'host front: the disk is full'},
     ],

@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import HostSpec, NodeSpec, ProcessSpec, WorkerSpec
+    from composer.language.specs import NodeSpec, ProcessSpec, WorkerSpec
     from composer.yaml_text.positions import DataPath
 
 _SECTIONS = ('workers', 'nodes', 'processes')
 
 
 def check_hosts(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check the hosts that are named against the inventory, and the inventory itself."""
+    """Check the hosts that are named against the inventory."""
     hosts = context.spec.hosts
     if not hosts or context.was_dropped(('hosts',)):
         return
@@ -29,18 +29,6 @@ def check_hosts(context: CheckContext) -> Iterator[Diagnostic]:
                 'unknown-host',
                 f"there is no host '{name}' in the inventory",
                 help=suggest(name, hosts, 'there are'),
-            )
-    seen: dict[tuple[object, ...], HostSpec] = {}
-    for host in hosts.values():
-        place = (host.address, host.user, host.port, host.folder)
-        other = seen.setdefault(place, host)
-        if other is not host:
-            yield context.at_key(
-                host.path,
-                'duplicate-host',
-                f"'{host.name}' has the address, user and folder of '{other.name}'",
-                help='give one of them another folder, or use one name for both',
-                related=[context.related(other.path, 'the other host is here')],
             )
 
 

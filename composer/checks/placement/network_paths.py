@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from composer.ament import has_ros
 from composer.checks.environment import installed_middlewares
 from composer.checks.placement.crossings import list_crossings, place_of
-from composer.network.servers import LOOPBACK, SERVED, list_sought
+from composer.network.addresses import is_loopback
+from composer.network.servers import SERVED, list_sought
 from composer.network.variables import RANGE, ZENOH
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def check_network(context: CheckContext) -> Iterator[Diagnostic]:
             help=f"write 'server: HOST', as in 'server: {hosts[0]}'",
         )
     for host in list_sought(context.spec, hosts):
-        if LOOPBACK.fullmatch(host.address):
+        if is_loopback(host.address):
             yield context.at_value(
                 (*host.path, 'address'),
                 'no-network-path',

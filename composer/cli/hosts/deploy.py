@@ -22,7 +22,8 @@ from composer.hosts.connection import find_real_address, import_asyncssh
 from composer.hosts.deployment import Deployment
 from composer.hosts.host_plan import render_plan
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.network.servers import LOOPBACK, list_sought, used_hosts
+from composer.network.addresses import is_loopback
+from composer.network.servers import list_sought, used_hosts
 from composer.terminal import escape
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ def find_addresses(spec: SystemSpec) -> Iterator[str]:
         if address == host.address:
             continue
         known = f"host {host.name}: '{host.address}' is {address} for ssh here (HostName)"
-        if LOOPBACK.fullmatch(address):
+        if is_loopback(address):
             _tell(f"warning: {known}: all hosts must know it as '{host.address}'")
         else:
             _tell(f'{known}: the hosts find each other by that')

@@ -23,7 +23,7 @@ CASES = [
     (HOSTS + 'workers: {w: {host: x}}\nnodes: {a: {worker: w}}', [('3:21', 'unknown-host', 'there are: base, jetson')]),
     (HOSTS + 'nodes: {}\nprocesses: {p: {command: [sleep], host: x}}', [('4:41', 'unknown-host', 'there are: base, jetson')]),
     (HOSTS + 'include: {arm: {file: arm.yaml, host: x}}', [('3:39', 'unknown-host', 'there are: base, jetson')]),
-    (HOSTS + 'network: {server: x}\nnodes: {a: {host: base}}', [('3:19', 'unknown-host', 'there are: base, jetson')]),
+    (HOSTS + 'network: {discovery: discovery_server, server: x}\nnodes: {a: {host: base}}', [('3:48', 'unknown-host', 'there are: base, jetson')]),
     # What is wrong with a host itself is said once.
     ('hosts: {base: {adress: x}}\nnodes: {a: {host: base}}', [('2:16', 'unknown-key', "did you mean 'address'?")]),
     ('hosts: {base: 3, jetson: {}}\nnodes: {a: {host: base}}', [('2:15', 'wrong-type', None)]),
