@@ -49,7 +49,7 @@ _RUNNING_STATES = ('active', 'reloading')
 
 
 def ps_across(asked: AskedSystem, *, format_name: str) -> int:
-    """Print the parts of a system; return the exit code: 1 if a host cannot be asked."""
+    """Print the parts of a system; return the exit code: 1 if one of them does not answer."""
     system, hosts = _read(asked)
     replies = asyncio.run(ask_composer(system, hosts, 'ps', '--format=json'))
     parts = [_part(system, each) for each in replies]
@@ -64,7 +64,7 @@ def ps_across(asked: AskedSystem, *, format_name: str) -> int:
         text = f'error: host {escape(each.host.name)}: the part runs, and does not answer'
         click.echo(text, err=True)
         click.echo(escape_each(each.error), nl=False, err=True)
-    return ExitCode.FAILED if silent else _code(replies)
+    return ExitCode.FAILED if any(part.status is None for part in parts) else ExitCode.DONE
 
 
 def _find_silent(
@@ -113,7 +113,7 @@ def top_across(asked: AskedSystem, view: View, *, once: bool, format_name: str) 
     if told:
         print_health(merge_health(told), view, format_name)
     _tell_problems(replies)
-    return _code(replies, all_must=True)
+    return _code(replies)
 
 
 def reload_across(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool) -> int:
@@ -124,7 +124,7 @@ def reload_across(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool)
     for each in replies:
         click.echo(escape_each(each.output), nl=False)
     _tell_problems(replies)
-    return _code(replies, all_must=True)
+    return _code(replies)
 
 
 def down_across(asked: AskedSystem, timeout_sec: float) -> int:
@@ -137,7 +137,7 @@ def down_across(asked: AskedSystem, timeout_sec: float) -> int:
         if each.code == 0:
             click.echo(f'{escape(system)}@{escape(each.host.name)}: stopped')
     _tell_problems(replies)
-    return _code(replies, all_must=True)
+    return _code(replies)
 
 
 def logs_across(asked: AskedSystem, *, follows: bool) -> int:
@@ -193,6 +193,6 @@ def _tell_problems(replies: Sequence[Reply]) -> None:
             click.echo(escape_each(each.error), nl=False, err=True)
 
 
-def _code(replies: Sequence[Reply], *, all_must: bool = False) -> int:
-    has_failed = any(each.code is None or (all_must and each.code) for each in replies)
+def _code(replies: Sequence[Reply]) -> int:
+    has_failed = any(each.code != 0 for each in replies)
     return ExitCode.FAILED if has_failed else ExitCode.DONE

@@ -74,7 +74,7 @@ def ps_command(asked: AskedSystem, format_name: str) -> int:
     """List the systems that run on this ROS graph, or SYSTEM alone.
 
     Of a FILE that declares hosts, its parts are listed: each host is asked over SSH.
-    If there is no such system, or it does not answer, the exit code is 1.
+    If there is no such system, or it or one of its parts does not answer, the exit code is 1.
     """
     if asked.are_files:
         from composer.cli.hosts.across import ps_across
