@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
     from composer.language.specs import SystemSpec
     from composer.runtime.control.control_services import Commands
+    from composer.runtime.local_part import SystemRecorder
     from composer.runtime.rewiring.reading import Reading
-    from composer.runtime.system import SystemRecorder
     from composer.runtime.workers.workers import Workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)

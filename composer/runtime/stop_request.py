@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
-from composer.runtime.logs import system_logger
+from composer.runtime.logs import is_output_unread, system_logger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -67,17 +67,14 @@ class StopRequest:
         if self.code in (ExitCode.DONE, ExitCode.INTERRUPTED):
             self.code = code
 
-    def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Wait until it is made; for one thread.
-
-        Args:
-            meanwhile: Called now and then.
-        """
+    def wait(self) -> None:
+        """Wait until it is made, or nobody reads the output any more; for one thread."""
         while not self.is_set:
             # A signal that comes right before the wait begins does not interrupt it.
             with suppress(queue.Empty):
                 self._wake_ups.get(timeout=_POLL_SEC)
-            meanwhile()
+            if is_output_unread():
+                self.fail('nobody reads the output any more, so the system ends')
 
     @contextmanager
     def waking(self, wake: Callable[[], None]) -> Iterator[bool]:

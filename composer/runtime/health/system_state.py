@@ -14,6 +14,8 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from composer.language.specs import SystemSpec
+
 
 @record
 class Outcome:
@@ -140,6 +142,11 @@ class SystemState:
                 'message': last.outcome.text,
             },
         }
+
+
+def system_title(spec: SystemSpec) -> str:
+    """Return the name of a system; that of the part of one host has the host's name behind it."""
+    return f'{spec.name}@{spec.host}' if spec.host else spec.name
 
 
 def find_log() -> str | None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.runtime.health.statistics import HealthRegistry
+from composer.runtime.messages.local_delivery import LocalTopics
+from composer.runtime.messages.local_services import LocalServices
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
@@ -17,9 +20,6 @@ if TYPE_CHECKING:
     from composer.language.specs import OnError, QosSpec
     from composer.ros_parameters.file_reader import ParameterEntry
     from composer.runtime.elsewhere import Elsewhere
-    from composer.runtime.health.statistics import HealthRegistry
-    from composer.runtime.messages.local_delivery import LocalTopics
-    from composer.runtime.messages.local_services import LocalServices
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.stop_request import StopRequest
     from composer.runtime.system_executor import SystemExecutor
@@ -86,17 +86,17 @@ class SystemHandle:
         shutdown: Ends the system with an exit code.
         executor: Runs the callbacks of all nodes.
         stop: The request to stop the system.
-        failures: Which services failed lately.
         without_parameter_services: The full names of the nodes that have none.
         stop_timeout_sec: What running behaviours get to end.
-        health: The health of the system's entities.
-        topics: Hands messages over between its nodes.
-        services: Hands requests over between its nodes.
         elsewhere: What of the system is not in the nodes of this process.
         create_entity: Creates one entity more of a `LiveNode`, of a section, from its record.
         observe: Takes what happens, with a kind of `Event`, a node, a name and a value; `None` if
             nobody wants to know.
         is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
+        failures: Which services failed lately.
+        health: The health of the system's entities.
+        topics: Hands messages over between its nodes.
+        services: Hands requests over between its nodes.
     """
 
     context: Context
@@ -110,16 +110,20 @@ class SystemHandle:
     shutdown: Callable[[int], None]
     executor: SystemExecutor
     stop: StopRequest
-    failures: ServiceFailures
     without_parameter_services: frozenset[str]
     stop_timeout_sec: float
-    health: HealthRegistry
-    topics: LocalTopics
-    services: LocalServices
     elsewhere: Elsewhere
     create_entity: Callable[[Any, str, Any], LiveEntity]
     observe: Observe | None = None
     is_outdated: Callable[[], bool] = never
+    failures: ServiceFailures = field(default_factory=ServiceFailures)
+    health: HealthRegistry = field(default_factory=HealthRegistry)
+    topics: LocalTopics = field(init=False)
+    services: LocalServices = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.topics = LocalTopics(self.executor)
+        self.services = LocalServices(self.executor)
 
     def tell(self, kind: EventKind, node: str, name: str, message: Any) -> None:
         """Tell who observes what came to its end, with a message that somebody may change."""

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from composer.processes.guardian_client import NoGuardian, mark_process
 from composer.records import record
-from composer.runtime.control.control_node import ControlNode
 from composer.runtime.health.introductions import Introductions
+from composer.runtime.local_part import LocalPart
 from composer.runtime.rewiring.reading import Reading
-from composer.runtime.system import System
+from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -17,12 +17,10 @@ if TYPE_CHECKING:
     from composer.language.specs import ProcessState, WorkerSpec
     from composer.planning.snapshot import Snapshot
     from composer.processes.channel import Channel
-    from composer.runtime.control.control_services import Commands
-    from composer.runtime.health.unmatched import GraphObserver
     from composer.runtime.workers.assignment import Assignment
 
 
-class WorkerSystem(System):
+class WorkerSystem(LocalPart):
     """A system whose start, edits and stop another process directs.
 
     Args:
@@ -43,13 +41,17 @@ class WorkerSystem(System):
         self._worker = assignment.worker
         self.label = f"worker '{self._worker.name}'"
         self.is_told_to_stop = False
+        self.workers = no_workers()
         super().__init__(
             self.read(assignment.snapshot, functions),
             _Keeper(channel),
+            SystemProcess(channel),
             assignment.ros_arguments,
             assignment.log_levels,
+            # Of hosts that are gone, the process of the system tells.
+            observers=[Introductions()],
+            worker=self._worker.name,
         )
-        self._handle.elsewhere = SystemProcess(channel)
 
     @staticmethod
     def read(snapshot: Snapshot, functions: Mapping[str, Callable[..., Any]]) -> Reading:
@@ -68,20 +70,6 @@ class WorkerSystem(System):
     def shutdown(self, code: int) -> None:
         """Ask for the end of the whole system."""
         self._channel.tell('request_stop', code)
-
-    def _create_observers(self) -> list[GraphObserver]:
-        # Of hosts that are gone, the process of the system tells.
-        return [Introductions()]
-
-    def _create_control(self, _commands: Commands | None) -> ControlNode:
-        return ControlNode(
-            self,
-            self._reading.spec,
-            self._handle.health,
-            self._hang_watcher,
-            None,
-            worker=self._worker.name,
-        )
 
     def describe_status(self) -> dict[str, Any]:
         """Return what this process says of itself."""
