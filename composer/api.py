@@ -68,7 +68,7 @@ def up(
         StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    from composer.cli.up import up as run
+    from composer.cli.starting.up import up as run
 
     paths = [Path(each) for each in (path, *layers)]
     return run(paths, words, ros_arguments, log_levels, set_values)

@@ -25,7 +25,12 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 # Variables that Python and libraries read once, when they start.
 _READ_ONCE = ('PYTHON', 'LANG', 'LC_', 'LD_', 'OMP_', 'OPENBLAS_', 'NPY_')
 # What these import in turn is none of ROS.
-_IMPORTED = ('composer.checks.checker', 'composer.cli.main', 'composer.cli.reload', 'numpy')
+_IMPORTED = (
+    'composer.checks.checker',
+    'composer.cli.main',
+    'composer.cli.starting.reload',
+    'numpy',
+)
 # The folder of the server stands in its search path for that of a child.
 _FOLDER = '/'
 _MAX_BYTES = 1 << 17

@@ -1,1 +1,1 @@
-"""The command line: `main` runs it, `commands` declares it, and each command has its own file."""
+"""The command line: `main` runs it, `commands` lists the commands, and each has its own file."""

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from composer.cli.show import describe_origin
+from composer.cli.showing.show import describe_origin
 from composer.errors import UsageError
 from composer.language.pipeline import load_combinations, load_system, load_system_text
 

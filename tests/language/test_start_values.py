@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from composer.checks.checker import check_system
-from composer.cli.show import final_data
+from composer.cli.showing.show import final_data
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system

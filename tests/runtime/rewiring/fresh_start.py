@@ -70,7 +70,7 @@ def running_system(paths, *, checks=True):
         ComposerError: It has errors, or cannot start.
     """
     from composer.cli.common.system_reader import SystemReader, import_reading
-    from composer.cli.reload import Reloader
+    from composer.cli.starting.reload import Reloader
     from composer.errors import ComposerError
     from composer.planning.snapshot_taking import take_snapshot
     from composer.processes.guardian_client import GuardianClient
@@ -151,7 +151,7 @@ def _import_all(paths):
     from composer.cli.common.system_reader import SystemReader
 
     for name in (
-        *('composer.cli.reload', 'composer.runtime.run', 'composer.runtime.system'),
+        *('composer.cli.starting.reload', 'composer.runtime.run', 'composer.runtime.system'),
         *('std_msgs.msg', 'std_srvs.srv', 'test_msgs.action', 'diagnostic_msgs.msg'),
         *('tests.runtime.rewiring.descriptions', 'tests.runtime.rewiring.observing'),
     ):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.checks.checker import create_context
-from composer.cli.check import select_systems
+from composer.cli.checking.check import select_systems
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors

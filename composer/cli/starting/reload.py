@@ -14,8 +14,8 @@ import click
 
 from composer.cli.common.system_reader import import_reading, list_files
 from composer.cli.common.told_findings import ToldFindings, with_findings
-from composer.cli.rehearsal import rehearse
-from composer.cli.watched_files import WatchedFiles
+from composer.cli.starting.rehearsal import rehearse
+from composer.cli.starting.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.cli.reload import Reloader
+    from composer.cli.starting.reload import Reloader
     from composer.diagnostics import Diagnostic
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
@@ -106,7 +106,7 @@ def up(  # noqa: PLR0913 - one for each option
         workers.kill_all()
         return ExitCode.FAILED
     check_ros()
-    from composer.cli.reload import Reloader
+    from composer.cli.starting.reload import Reloader
 
     if not rehearses:
         wait_for_network(context.spec, lambda text: click.echo(text, err=True))

@@ -8,7 +8,7 @@ import pytest
 
 from composer.cli import main as cli
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 CALCULATOR_ARGUMENTS = """the file declares
   a (integer, required): The first number.

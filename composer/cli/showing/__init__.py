@@ -1,0 +1,1 @@
+"""The commands that show what files say: `show`, `graph`, and `schema` and `stubs` for editors."""

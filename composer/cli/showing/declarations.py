@@ -1,0 +1,137 @@
+"""Declare the commands that show what files say: see `composer.cli.commands`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from composer.cli.common.argument_types import (
+    NUMBERS_ARE_VALUES,
+    refuse_together,
+    split_words,
+    takes_system,
+)
+from composer.drawing import FORMATS as PICTURE_FORMATS
+
+
+@click.command('show', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
+@click.option(
+    '--format',
+    'output_format',
+    type=click.Choice(['yaml', 'json']),
+    default='yaml',
+    show_default=True,
+    help='The output format.',
+)
+@click.option('--origin', is_flag=True, help='Add to each value where it comes from.')
+@click.option(
+    '--args', 'wants_arguments', is_flag=True, help='List the arguments that FILE declares.'
+)
+@click.option(
+    '--params',
+    'wants_parameters',
+    is_flag=True,
+    help='Print the parameters of all nodes as a ROS parameter file.',
+)
+def show_command(
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
+    output_format: str,
+    *,
+    origin: bool,
+    wants_arguments: bool,
+    wants_parameters: bool,
+) -> int:
+    """Print the final system, with everything resolved.
+
+    Includes, layers, arguments and expressions are replaced by what they result in. The output
+    is a valid system itself. Takes LAYER and NAME:=VALUE as `composer up` does.
+    """
+    from composer.cli.showing.show import show, show_arguments, show_parameters
+
+    refuse_together(
+        {
+            '--args': wants_arguments,
+            '--params': wants_parameters,
+            '--origin': origin,
+            '--format json': output_format == 'json',
+        }
+    )
+    paths, arguments = split_words(words)
+    if wants_arguments:
+        return show_arguments(paths, set_values)
+    if wants_parameters:
+        return show_parameters(paths, arguments, set_values)
+    return show(paths, arguments, set_values, output_format=output_format, origins=origin)
+
+
+@click.command('graph', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
+@click.option(
+    '--format',
+    'format_name',
+    type=click.Choice(list(PICTURE_FORMATS)),
+    help='The format; by default that of the suffix of --output, else mermaid.',
+)
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, dir_okay=False),
+    help='Write the drawing to this file.',
+)
+def graph_command(
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
+    *,
+    format_name: str | None,
+    output: Path | None,
+) -> int:
+    """Draw the graph of nodes, topics, services and actions.
+
+    Shows types, QoS that is not the default, and what `composer check` finds. svg and html need
+    Graphviz: the program, or the extra 'graph'. Takes LAYER and NAME:=VALUE as `composer up` does.
+    """
+    from composer.cli.showing.graph import graph
+
+    paths, arguments = split_words(words)
+    return graph(paths, arguments, set_values, format_name=format_name, output=output)
+
+
+@click.command('schema')
+@click.option('--path', 'path_only', is_flag=True, help='Print the path of the schema file.')
+@click.option('--matrix', is_flag=True, help='Print the schema of the files of check --matrix.')
+@click.option('--scenarios', is_flag=True, help='Print the schema of scenario files.')
+def schema_command(*, path_only: bool, matrix: bool, scenarios: bool) -> int:
+    """Print the JSON Schema of system files, for editors."""
+    from composer.cli.showing.editors import print_schema
+
+    refuse_together({'--path': path_only, '--matrix': matrix})
+    return print_schema(path_only=path_only, matrix=matrix, scenarios=scenarios)
+
+
+@click.command('stubs', context_settings=NUMBERS_ARE_VALUES)
+@takes_system
+@click.option(
+    '--output',
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path('typings'),
+    show_default=True,
+    metavar='DIR',
+    help='The folder to write them to.',
+)
+def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: Path) -> int:
+    """Write typed stubs of the messages and nodes of FILE.
+
+    Layers, arguments and --set are those of 'composer up'; without arguments and --set, several
+    files, folders and patterns may be named.
+
+    Annotate a behaviour with the class of its node, as in `node: Governor` after
+    `from composer_stubs.robot import Governor` under `if TYPE_CHECKING:`.
+    """
+    from composer.cli.showing.editors import write_stubs
+
+    return write_stubs(words, set_values, output)
+
+
+COMMANDS = (show_command, graph_command, schema_command, stubs_command)

@@ -1,0 +1,1 @@
+"""`composer up`, and how a running system follows its files."""

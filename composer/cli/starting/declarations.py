@@ -1,0 +1,127 @@
+"""Declare `composer up`: see `composer.cli.commands`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from composer.cli.common.argument_types import (
+    NUMBERS_ARE_VALUES,
+    check_log_levels,
+    split_words,
+    takes_host,
+    takes_system,
+    takes_topics,
+)
+from composer.cli.common.recording_options import RecordingOptions
+from composer.errors import ExitCode
+from composer.terminal import escape
+
+
+@click.command('up', context_settings={**NUMBERS_ARE_VALUES, 'help_option_names': []})
+@takes_system
+@click.option(
+    '--log-level',
+    'log_levels',
+    multiple=True,
+    metavar='[NODE:=]LEVEL',
+    callback=check_log_levels,
+    help='Set the log level (debug, info, warn, error or fatal) of all nodes, or of one. '
+    'Overrides the file. Can be repeated.',
+)
+@takes_host
+@click.option(
+    '--watch', 'watches', is_flag=True, help='Change the running system when its files change.'
+)
+@click.option(
+    '--detach',
+    '-d',
+    'detaches',
+    is_flag=True,
+    help="Give the terminal back once all of it is up. 'composer logs' shows what it says.",
+)
+@click.option(
+    '--no-control',
+    'is_asked',
+    is_flag=True,
+    default=True,
+    flag_value=False,
+    help="Leave out the services that 'composer reload', 'down' and the like use.",
+)
+@click.option(
+    '--record',
+    type=click.Path(path_type=Path),
+    metavar='FILE',
+    help='Record its topics to this MCAP file; a name without .mcap is a folder of rosbag2.',
+)
+@takes_topics
+@click.option(
+    '--hold',
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar='FILE',
+    help='Create all nodes, but run no behaviour while this file is there, for 60 s at most.',
+)
+# What a system that must start again asks of another process before.
+@click.option('--rehearse', 'rehearses', is_flag=True, hidden=True)
+@click.option(
+    '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
+)
+@click.pass_context
+def up_command(  # noqa: PLR0913 - one for each option
+    context: click.Context,
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
+    log_levels: tuple[str, ...],
+    host: str,
+    *,
+    watches: bool,
+    detaches: bool,
+    is_asked: bool,
+    record: Path | None,
+    topics: tuple[str, ...],
+    hold: Path | None,
+    rehearses: bool,
+    wants_help: bool,
+) -> int:
+    """Check FILE, then run its system until it is stopped.
+
+    Each LAYER (.yaml or .yml) changes the files before it. Give the arguments that FILE declares
+    by name, NAME:=VALUE, or in their order, VALUE. ROS arguments follow --ros-args and go to every
+    node.
+    """
+    from composer.cli.starting.up import describe_file_arguments, up
+
+    if wants_help:
+        click.echo(context.get_help())
+        if words:
+            paths, _ = split_words(words)
+            click.echo(f'\n{escape(str(paths[0]))}: {describe_file_arguments(paths)}')
+        return ExitCode.DONE
+    paths, arguments = split_words(words)
+    if detaches:
+        from composer.cli.running.detach import start_detached
+
+        options = [f'--set={each}' for each in set_values]
+        options += [f'--log-level={each}' for each in log_levels]
+        options += [f'--host={host}'] * bool(host)
+        options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
+        options += [f'--record={record}'] * (record is not None)
+        options += [f'--topics={each}' for each in topics]
+        options += [f'--hold={hold}'] * (hold is not None)
+        given = [*options, *words, '--ros-args', *context.obj, '--']
+        return start_detached(paths[0], given, host)
+    return up(
+        paths,
+        arguments,
+        context.obj,
+        log_levels,
+        set_values,
+        host=host,
+        watches=watches,
+        is_asked=is_asked,
+        recording=RecordingOptions(record, topics),
+        hold=hold,
+        ends_process=True,
+        rehearses=rehearses,
+    )
