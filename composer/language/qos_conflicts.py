@@ -27,6 +27,8 @@ CONFLICTS = {
 }
 # The offered duration must not be longer than the requested one.
 MATCHED_DURATIONS = ('deadline', 'liveliness_lease_duration')
+# All that a match depends on.
+MATCHED_POLICIES = frozenset((*CONFLICTS, *MATCHED_DURATIONS))
 
 
 @record

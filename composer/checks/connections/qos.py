@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from composer.language.qos import (
@@ -13,7 +13,7 @@ from composer.language.qos import (
     resolve_qos,
     settle_best_available,
 )
-from composer.language.qos_conflicts import QosConflict, find_qos_conflicts
+from composer.language.qos_conflicts import MATCHED_POLICIES, QosConflict, find_qos_conflicts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -30,7 +30,8 @@ Policies = tuple[tuple[str, Any], ...]
 def check_qos_pairs(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that the QoS of all ends of a topic or service can match.
 
-    What has the same QoS is looked at once: one finding for each pair of different ones.
+    One finding for each pair of different QoS that cannot match. The work grows with the number of
+    ends, and of different policies that a match depends on, not with that of all pairs.
     """
     for kind in ('topic', 'service'):
         for channel in context.topology.of_kind(kind):
@@ -39,12 +40,35 @@ def check_qos_pairs(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _check_channel(context: CheckContext, channel: Channel) -> Iterator[Diagnostic]:
-    providers = _by_policies(context, channel.providers)
     users = _by_policies(context, channel.users)
-    for (offered, provider), (requested, user) in product(providers.items(), users.items()):
-        conflicts = list(_find_conflicts(channel, dict(offered), dict(requested)))
-        if conflicts:
-            yield _explain(context, channel, provider, user, conflicts)
+    by_matched = _group(users)
+
+    @cache
+    def conflicting_users(offered: Policies) -> list[tuple[int, list[QosConflict]]]:
+        """Return which users do not match what is offered, in their order, and why."""
+        found = (
+            (indices, list(_find_conflicts(channel, dict(offered), dict(requested))))
+            for requested, indices in by_matched.items()
+        )
+        return sorted((index, why) for indices, why in found if why for index in indices)
+
+    ends = list(users.values())
+    for offered, provider in _by_policies(context, channel.providers).items():
+        for index, conflicts in conflicting_users(_matched(offered)):
+            yield _explain(context, channel, provider, ends[index], conflicts)
+
+
+def _matched(policies: Policies) -> Policies:
+    """Return the policies that a match depends on."""
+    return tuple(each for each in policies if each[0] in MATCHED_POLICIES)
+
+
+def _group(ends: Iterable[Policies]) -> dict[Policies, list[int]]:
+    """Return the positions of the QoS that are matched alike."""
+    groups: dict[Policies, list[int]] = {}
+    for index, policies in enumerate(ends):
+        groups.setdefault(_matched(policies), []).append(index)
+    return groups
 
 
 def _by_policies(context: CheckContext, ends: Iterable[Endpoint]) -> dict[Policies, Endpoint]:

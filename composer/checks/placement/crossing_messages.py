@@ -15,8 +15,9 @@ from composer.interfaces.descriptions import MessageDescription
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from composer.checks.connections.topology import Endpoint
     from composer.checks.context import CheckContext
-    from composer.checks.placement.crossings import Crossing
+    from composer.checks.placement.crossings import Crossing, Place
     from composer.diagnostics import Diagnostic
     from composer.interfaces.descriptions import FieldType
 
@@ -50,9 +51,13 @@ def check_crossing_messages(context: CheckContext) -> Iterator[Diagnostic]:
 
 def _check_size(context: CheckContext, crossing: Crossing) -> Iterator[Diagnostic]:
     """Check that a topic has no big messages; a publisher is reported once."""
-    receivers = [each for each in crossing.receivers if not each.is_declared]
+    # The first of each place, as there may be thousands.
+    receivers: dict[Place, Endpoint] = {}
+    for each in crossing.receivers:
+        if not each.is_declared:
+            receivers.setdefault(place_of(each), each)
     for publisher in crossing.senders:
-        elsewhere = (each for each in receivers if why_crossing(publisher, each))
+        elsewhere = (each for each in receivers.values() if why_crossing(publisher, each))
         subscription = None if publisher.is_declared else next(elsewhere, None)
         if subscription is None:
             continue
@@ -72,13 +77,17 @@ def _check_size(context: CheckContext, crossing: Crossing) -> Iterator[Diagnosti
 def _check_promises(context: CheckContext, crossing: Crossing) -> Iterator[Diagnostic]:
     """Check that ends which are to hand over have another end in their process."""
     channel = crossing.channel
+    users, providers = (
+        {place_of(each) for each in ends if not each.is_declared}
+        for ends in (channel.users, channel.providers)
+    )
     for end in (*crossing.senders, *crossing.receivers):
         path = (*end.path, _LOCAL)
         # It is true by default, which promises nothing.
         if path not in context.system.positions.values or not getattr(end.entity, _LOCAL, False):
             continue
-        others = channel.users if end.kind.provides else channel.providers
-        if not any(place_of(each) == place_of(end) for each in others if not each.is_declared):
+        if place_of(end) not in (users if end.kind.provides else providers):
+            others = channel.users if end.kind.provides else channel.providers
             yield context.at_value(
                 path,
                 'not-handed-over',
