@@ -99,7 +99,7 @@ def up(  # noqa: PLR0913 - one for each option
     reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
     workers = Workers(ros_arguments, log_levels)
     begun_ns = time_ns()
-    context, _files, told = reader.read(loaded=lambda system: _spawn_early(workers, system))
+    context, _files, told = reader.read(loaded=lambda system: _spawn_early(workers, system, host))
     report = _show_errors if rehearses else show_findings
     report(told)
     if context is None or has_errors(told):
@@ -147,12 +147,13 @@ def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
         return variables
 
 
-def _spawn_early(workers: Workers, system: LoadedSystem) -> None:
+def _spawn_early(workers: Workers, system: LoadedSystem, host: str) -> None:
     """Start the workers of a system while it is checked, if it is known what they start with."""
     spec = system.spec
     if spec is None or has_errors(system.diagnostics) or system.start.found:
         return
-    if spec.host or spec.network or spec.interfaces:
+    # Which workers the part of a host has is known once all is checked.
+    if host or spec.network or spec.interfaces:
         return
     # What is wrong is told when all is checked.
     with suppress(ComposerError):
