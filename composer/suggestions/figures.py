@@ -28,6 +28,7 @@ class EntityFigures:
         node: The full name of its node.
         cpu: How many processors its calls used on average.
         gil: The share of the time in which they held the interpreter.
+        is_gil_known: Whether that was measured; else it is `cpu`.
         rate_hz: Calls in a second.
         lost_hz: Messages that were dropped from its queue in a second.
         worker: Where it ran; empty for the process of the system.
@@ -41,6 +42,7 @@ class EntityFigures:
     rate_hz: float
     lost_hz: float = 0.0
     worker: str = ''
+    is_gil_known: bool = True
 
 
 @record
@@ -63,22 +65,38 @@ class Averages:
 
     def __init__(self) -> None:
         self._sums: dict[_Task, list[float]] = {}
+        self._without_gil: dict[_Task, list[float]] = {}
         self._workers: dict[_Task, str] = {}
 
-    def add(self, task: _Task, figures: Iterable[float], worker: str) -> None:
-        """Take figures of an entity: `cpu`, `gil`, `rate_hz`, and messages that were dropped.
+    def add(
+        self,
+        task: _Task,
+        cpu: float,
+        gil: float | None,
+        figures: tuple[float, float],
+        worker: str,
+    ) -> None:
+        """Take figures of an entity.
 
         Args:
             task: Node, kind, name and key of the entity.
+            gil: `None` if it is not known of the period.
+            figures: `rate_hz`, and messages that were dropped.
             worker: Where it ran.
         """
         self._workers[task] = worker
-        sums = self._sums.setdefault(task, [0.0] * 5)
-        for index, value in enumerate((*figures, 1.0)):
+        all_sums = self._without_gil if gil is None else self._sums
+        sums = all_sums.setdefault(task, [0.0] * 5)
+        for index, value in enumerate((cpu, cpu if gil is None else gil, *figures, 1.0)):
             sums[index] += value
 
     def entities(self) -> tuple[EntityFigures, ...]:
-        """Return the averages, in the order of names; what an entity has several of is one."""
+        """Return the averages, in the order of names; what an entity has several of is one.
+
+        There are none if it is not known of any how long it held the interpreter.
+        """
+        if not self._sums:
+            return ()
         return tuple(
             EntityFigures(
                 *task[:3],
@@ -87,8 +105,9 @@ class Averages:
                 rate_hz=sums[2] / sums[4],
                 lost_hz=sums[3] / sums[4],
                 worker=self._workers[task],
+                is_gil_known=task in self._sums,
             )
-            for task, sums in sorted(self._sums.items())
+            for task, sums in sorted({**self._without_gil, **self._sums}.items())
         )
 
 
@@ -154,9 +173,7 @@ class _DiagnosticsReader:
             if values.get('cores', '').isdecimal():
                 self.cores = int(values['cores'])
             task = _TASK.fullmatch(status.name)
-            if task is None or not (values.get('cpu (%)') and values.get('GIL (%)')):
-                continue
-            if 'rate (Hz)' in values:
+            if task is not None and values.get('cpu (%)') and 'rate (Hz)' in values:
                 self._add(status.name, task, values, now_sec)
 
     def _add(
@@ -166,14 +183,13 @@ class _DiagnosticsReader:
         before_sec, before = self._lost.get(name, (now_sec, lost))
         self._lost[name] = now_sec, lost
         passed_sec = now_sec - before_sec
+        lost_hz = (lost - before) / passed_sec if passed_sec > 0 else 0.0
+        gil = values.get('GIL (%)')
         self.averages.add(
             (task['node'], task['kind'], task['name'] or '', name),
-            (
-                float(values['cpu (%)']) / _PERCENT,
-                float(values['GIL (%)']) / _PERCENT,
-                float(values['rate (Hz)']),
-                (lost - before) / passed_sec if passed_sec > 0 else 0.0,
-            ),
+            float(values['cpu (%)']) / _PERCENT,
+            float(gil) / _PERCENT if gil else None,
+            (float(values['rate (Hz)']), lost_hz),
             values.get('worker', ''),
         )
 
@@ -202,11 +218,11 @@ def average_answers(answers: Iterable[Mapping[str, Any]]) -> tuple[EntityFigures
     before: dict[_Task, int] = {}
     for answer in answers:
         for each in answer['entities']:
-            if each['cpu'] is None or each['gil'] is None:
+            if each['cpu'] is None:
                 continue
             task = each['node'], each['kind'], each['name'], each['key']
             lost = each['dropped'] - before.get(task, each['dropped'])
             before[task] = each['dropped']
-            figures = each['cpu'], each['gil'], each['rate_hz'], lost / answer['period_sec']
-            averages.add(task, figures, each['worker'])
+            figures = each['rate_hz'], lost / answer['period_sec']
+            averages.add(task, each['cpu'], each['gil'], figures, each['worker'])
     return averages.entities()

@@ -88,6 +88,8 @@ def _load_of(node: NodeSpec, entities: Iterable[EntityFigures]) -> NodeLoad:
         cpu=sum(each.cpu for each in own),
         gil=min(1.0, sum(each.gil for each in own)),
         worker=node.worker,
+        is_measured=bool(own),
+        is_gil_known=all(each.is_gil_known for each in own),
     )
 
 

@@ -61,9 +61,18 @@ def _table(suggestion: Suggestion) -> list[str]:
         nodes = [node for node in load.nodes if split[node.name] == worker]
         busy = [node for node in nodes if node.gil or node.cpu]
         named = ', '.join(f'{node.name} {node.gil:.0%}' for node in busy)
-        idle = f'{len(nodes) - len(busy)} that did nothing' if len(busy) < len(nodes) else ''
+        unknown = [node for node in nodes if not node.is_measured]
+        idle = len(nodes) - len(busy) - len(unknown)
+        parts = (
+            named,
+            f'{idle} that did nothing' if idle else '',
+            f'{len(unknown)} without figures' if unknown else '',
+        )
         what = f'worker {worker}' if worker else _MAIN
-        lines.append(f'  {what}: {", ".join(filter(None, (named, idle)))}')
+        lines.append(f'  {what}: {", ".join(filter(None, parts))}')
+    guessed = ', '.join(node.name for node in load.nodes if not node.is_gil_known)
+    if guessed:
+        lines.append(f'  the GIL of these is not known, and taken to be their CPU: {guessed}')
     if suggestion.after.crossing > 0:
         lines.append(f'  messages between them: {suggestion.after.crossing:.0%} of a core')
     return lines
@@ -86,6 +95,7 @@ def render_json(suggestion: Suggestion, system: str, keys: Mapping[str, str]) ->
                 'node': node.name,
                 'cpu': node.cpu,
                 'gil': node.gil,
+                'gil_known': node.is_measured and node.is_gil_known,
                 'worker': node.worker,
                 'suggested': suggestion.moves.get(node.name, node.worker),
             }

@@ -35,8 +35,10 @@ class CallMeter:
         self._waits: InterpreterWaits | None = None
 
     def turn(self, *, on: bool) -> None:
-        """Begin to measure, or end it."""
+        """Begin to measure, go on with it, or end it."""
         if on == self.is_on:
+            if self.is_on and self._holders is not None:
+                self._holders.go_on()
             return
         if on:
             self._marks = {

@@ -39,8 +39,13 @@ class LockField:
 
 
 @cache
-def find_lock_field() -> LockField | None:
-    """Return where it is; `None` in a Python that has no such lock, or keeps it otherwise."""
+def find_lock_field() -> LockField:
+    """Return where it is.
+
+    Raises:
+        LookupError: This Python has no such lock, or keeps it otherwise; or somebody has changed
+            the switch interval right now.
+    """
     api = ctypes.pythonapi
     for name in ('PyThreadState_Get', 'PyInterpreterState_Get'):
         getattr(api, name).restype = ctypes.c_void_p
@@ -53,7 +58,8 @@ def find_lock_field() -> LockField | None:
         at = _read_own(start, _MOST_BYTES).find(pattern)
         if offset >= 0 and at >= 0:
             return LockField(start + at + _WORD, offset)
-    return None
+    message = 'no such lock'
+    raise LookupError(message)
 
 
 def _runtime_address() -> int:
@@ -66,4 +72,6 @@ def _read_own(address: int, most: int) -> bytes:
     page = Memory(os.getpid(), _PAGE)
     while len(data) < most and (more := page.read(address + len(data))):
         data += more
+        if len(more) < _PAGE:
+            break
     return data

@@ -8,12 +8,15 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
+from time import monotonic
 
 from composer.records import record
 from composer.runtime.costs import lock_sampler
 from composer.runtime.costs.lock_field import find_lock_field
 
 _PR_SET_PTRACER = 0x59616D61
+# How long it takes until it is tried again what has failed.
+_AGAIN_SEC = 5.0
 
 
 @record
@@ -37,36 +40,50 @@ class LockHolders:
 
     def __init__(self) -> None:
         self._places: dict[int, int] = {}
-        self._memory = mmap.mmap(-1, lock_sampler.TABLE_SIZE)
+        self._table = memoryview(mmap.mmap(-1, lock_sampler.TABLE_SIZE)).cast('Q')
         self._process: subprocess.Popen[bytes] | None = None
-        self._table = memoryview(self._memory).cast('Q')
-        field = find_lock_field()
-        if field is None or not sys.executable:
+        self._tried_at = -_AGAIN_SEC
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Start the sampler if it does not run: it was killed, say, or could not be started."""
+        now = monotonic()
+        if self.is_running or now < self._tried_at + _AGAIN_SEC or not sys.executable:
             return
-        descriptor = os.memfd_create('composer-lock-holders')
-        try:
-            os.ftruncate(descriptor, lock_sampler.TABLE_SIZE)
-            self._memory = mmap.mmap(descriptor, lock_sampler.TABLE_SIZE)
-            self._table = memoryview(self._memory).cast('Q')
-            arguments = os.getpid(), descriptor, field.holder, field.thread_offset
-            self._start(descriptor, [str(each) for each in arguments])
-        finally:
-            os.close(descriptor)
+        self._tried_at = now
+        # Without it there are no figures, and that is all.
+        with suppress(LookupError, OSError):
+            field = find_lock_field()
+            descriptor = os.memfd_create('composer-lock-holders')
+            try:
+                self._use_table(descriptor)
+                arguments = os.getpid(), descriptor, field.holder, field.thread_offset
+                self._start(descriptor, [str(each) for each in arguments])
+            finally:
+                os.close(descriptor)
+
+    def _use_table(self, descriptor: int) -> None:
+        """Let a table be in a file, with what was sampled before."""
+        os.ftruncate(descriptor, lock_sampler.TABLE_SIZE)
+        table = memoryview(mmap.mmap(descriptor, lock_sampler.TABLE_SIZE)).cast('Q')
+        table[:] = self._table
+        self._table = table
 
     def _start(self, descriptor: int, arguments: list[str]) -> None:
-        # Without it there are no figures, and that is all.
-        with suppress(OSError):
-            self._process = subprocess.Popen(  # noqa: S603 - our own script
-                [sys.executable, '-I', '-S', lock_sampler.__file__, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                pass_fds=(descriptor,),
-                start_new_session=True,
-            )
-            # Where Yama lets only parents read their children; elsewhere this does nothing.
-            # Source: https://docs.kernel.org/admin-guide/LSM/Yama.html
-            ctypes.CDLL(None).prctl(_PR_SET_PTRACER, ctypes.c_ulong(self._process.pid), 0, 0, 0)
+        self._process = subprocess.Popen(  # noqa: S603 - our own script
+            [sys.executable, '-I', '-S', lock_sampler.__file__, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=(descriptor,),
+            start_new_session=True,
+        )
+        # Where Yama lets only parents read their children; elsewhere this does nothing.
+        # Source: https://docs.kernel.org/admin-guide/LSM/Yama.html
+        ctypes.CDLL(None).prctl(_PR_SET_PTRACER, ctypes.c_ulong(self._process.pid), 0, 0, 0)
+        assert self._process.stdin is not None  # noqa: S101 - a pipe
+        with self._process.stdin as begin:
+            begin.write(b'\n')
 
     @property
     def is_running(self) -> bool:

@@ -3,14 +3,15 @@
 Whoever asks within a process waits for the interpreter himself, and when he has it, nobody else
 does. So another process reads the holder out of the memory, and disturbs nobody.
 
-It runs as a script and imports nothing of Composer, to start fast and stay small. It ends when it
-is killed, when the process has ended, and when it may not read. What it finds is in a table of
-64-bit numbers that both share, see below.
+It runs as a script and imports nothing of Composer, to start fast and stay small. It begins when
+it is sent a byte, and ends when it is killed, when the process has ended, and when it may not
+read. What it finds is in a table of 64-bit numbers that both share, see below.
 """
 
 import contextlib
 import ctypes
 import mmap
+import os
 import resource
 import struct
 import sys
@@ -55,11 +56,11 @@ class Memory:
         return (ctypes.c_size_t * 2)(address, self._size)
 
     def read(self, address: int) -> bytes:
-        """Return what is there; empty if it cannot be read."""
+        """Return what is there, up to what cannot be read."""
         there = self._vector(address)
         one, none = ctypes.c_ulong(1), ctypes.c_ulong(0)
         count = self._read(self._pid, self._into, one, there, one, none)
-        return self._buffer.raw if count == self._size else b''
+        return self._buffer.raw[: max(0, count)]
 
 
 def main(pid: int, descriptor: int, holder_address: int, thread_offset: int) -> None:
@@ -73,7 +74,9 @@ def main(pid: int, descriptor: int, holder_address: int, thread_offset: int) -> 
     """
     table = memoryview(mmap.mmap(descriptor, TABLE_SIZE)).cast('Q')
     holder, thread = Memory(pid, HOLDER.size), Memory(pid, 8)
-    places: dict[int, int] = {}
+    # Another one may have begun it.
+    known = range(FIRST, FIRST + 2 * table[THREADS], 2)
+    places = {table[place]: place + 1 for place in known}
     phase, before_ns, due_ns = 0.0, time.monotonic_ns(), 0
     while data := holder.read(holder_address):
         now_ns = time.monotonic_ns()
@@ -113,4 +116,5 @@ def add_thread(table: 'memoryview[int]', places: dict[int, int], ident: int) -> 
 
 if __name__ == '__main__':
     leave_to_itself()
+    os.read(0, 1)
     main(*map(int, sys.argv[1:]))

@@ -125,7 +125,7 @@ def test_a_recording_says_what_to_split(system, capsys, tmp_path):
     out = capsys.readouterr()[0]
     assert out == (
         'system: 1.0 of 4 cores used → 1.8, expected 1.8x\n'
-        '  the process of the system: /camera 45%, /cam_left 2%, 1 that did nothing\n'
+        '  the process of the system: /camera 45%, /cam_left 2%, 1 without figures\n'
         '  worker detect: /detect 50%\n'
         '  messages between them: 4% of a core\n'
         '\n'
@@ -146,6 +146,18 @@ def test_the_cores_are_those_of_where_it_was_recorded(system, capsys, tmp_path):
     document = json.loads(capsys.readouterr()[0])
     assert document['cores'] == 4
     assert document['layer'] == {'nodes': {'detect': {'worker': 'detect'}}}
+
+
+def test_cpu_stands_for_a_gil_that_is_not_known(system, capsys, tmp_path):
+    idle = Entity('/cam_right: timer look', 0, 0, 1)
+    recording = record(tmp_path, BUSY[0], BUSY[1]._replace(gil=''), idle)
+    assert run(['suggest', str(system), '--recording', str(recording)]) == 0
+    assert capsys.readouterr()[0].startswith(
+        'system: 0.9 of 4 cores used → 1.8, expected 1.8x\n'
+        '  the process of the system: /detect 50%, 1 that did nothing, 1 without figures\n'
+        '  worker camera: /camera 45%\n'
+        '  the GIL of these is not known, and taken to be their CPU: /detect\n'
+    )
 
 
 def test_what_is_dropped_and_late_is_what_there_is_to_do(system, capsys, tmp_path):

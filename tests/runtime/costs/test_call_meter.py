@@ -3,7 +3,10 @@
 import ctypes
 import hashlib
 import json
+import mmap
+import os
 import re
+import signal
 import threading
 import time
 import zlib
@@ -16,7 +19,7 @@ pytest.importorskip('numpy')
 
 import numpy as np
 
-from composer.runtime.costs import lock_holders
+from composer.runtime.costs import lock_field, lock_holders
 from composer.runtime.costs.call_meter import CallMeter, call_meter
 from composer.runtime.costs.process_costs import ProcessMeter
 
@@ -157,22 +160,72 @@ def test_a_call_that_does_not_end_is_measured_from_outside():
     wait_until(lambda: meter.lap_of(thread.ident, thread.native_id) == (0, 0), 'end of it')
 
 
-def test_nothing_is_left_running(tmp_path):
-    def children():
-        return [
-            each
-            for task in Path('/proc/self/task').iterdir()
-            for each in (task / 'children').read_text().split()
-        ]
+def children():
+    return [
+        each
+        for task in Path('/proc/self/task').iterdir()
+        for each in (task / 'children').read_text().split()
+    ]
 
+
+def test_nothing_is_left_running():
     before = children()
     with measuring():
         assert len(children()) == len(before) + 1
     assert children() == before
 
 
+def test_a_sampler_that_was_killed_is_replaced_while_somebody_looks(monkeypatch):
+    monkeypatch.setattr(lock_holders, '_AGAIN_SEC', 0.1)
+    others = set(children())
+    with measuring() as meter:
+        (sampler,) = set(children()) - others
+        os.kill(int(sampler), signal.SIGKILL)
+        wait_until(lambda: not meter.is_sampling, 'end of the sampler')
+        before = meter.sampled()
+
+        def goes_on():
+            meter.turn(on=True)
+            return meter.sampled().elapsed_ns > before.elapsed_ns
+
+        wait_until(goes_on, 'samples')
+        wait_for_shares(meter, (loop, loop), lambda first, second: first + second > 0.7)
+
+
+def find_nothing():
+    raise LookupError
+
+
+def test_a_lock_that_was_not_found_is_looked_for_again(monkeypatch):
+    monkeypatch.setattr(lock_holders, '_AGAIN_SEC', 0.1)
+    meter = CallMeter()
+    with monkeypatch.context() as patch:
+        patch.setattr(lock_holders, 'find_lock_field', find_nothing)
+        meter.turn(on=True)
+    try:
+
+        def is_sampling():
+            meter.turn(on=True)
+            return meter.is_sampling
+
+        wait_until(is_sampling, 'sampler')
+    finally:
+        meter.turn(on=False)
+
+
+def test_memory_is_read_up_to_its_end():
+    # The state of a thread may be the last thing in what was allocated.
+    memory = mmap.mmap(-1, 2 * mmap.PAGESIZE)
+    begin = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+    end = begin + mmap.PAGESIZE
+    assert LIBC.mprotect(ctypes.c_void_p(end), mmap.PAGESIZE, 0) == 0
+    memory[mmap.PAGESIZE - 100 : mmap.PAGESIZE] = bytes(range(100))
+    assert lock_field._read_own(end - 100, 512) == bytes(range(100))
+    assert lock_field._read_own(end, 512) == b''
+
+
 def test_where_the_lock_is_not_found_only_the_processor_is_measured(monkeypatch):
-    monkeypatch.setattr(lock_holders, 'find_lock_field', lambda: None)
+    monkeypatch.setattr(lock_holders, 'find_lock_field', find_nothing)
     meter = CallMeter()
     meter.turn(on=True)
     loop()
