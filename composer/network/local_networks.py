@@ -1,4 +1,4 @@
-"""Whether this computer is on a network.
+"""Whether this computer is on a network, and has the port free that a server here needs.
 
 Fast DDS looks for interfaces when a process starts, and uses no others later: a part of a system
 that starts while its cable is out would never find the other hosts. So it waits a while.
@@ -6,11 +6,14 @@ that starts while its cable is out would never find the other hosts. So it waits
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import socket
 import struct
 from time import monotonic, sleep
 from typing import TYPE_CHECKING
+
+from composer.errors import StartError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +25,7 @@ _GET_FLAGS = 0x8913
 _LOOPBACK, _RUNNING = 0x8, 0x40
 _REQUEST = struct.Struct('16sH14x')
 _LONGEST_SEC = 40.0
+_PORT_SEC = 5.0
 _POLL_SEC = 0.25
 
 
@@ -43,6 +47,40 @@ def wait_for_network(spec: SystemSpec, tell: Callable[[str], object]) -> None:
             )
             return
         sleep(_POLL_SEC)
+
+
+def wait_for_port(spec: SystemSpec) -> None:
+    """Wait until the port of the discovery server is free, if the part of a host runs that.
+
+    The server of a system that was killed may be there for a moment.
+
+    Raises:
+        StartError: Another program has it.
+    """
+    network = spec.network
+    if network is None or network.discovery != 'discovery_server' or network.server != spec.host:
+        return
+    deadline = monotonic() + _PORT_SEC
+    while not _is_free(network.port):
+        if monotonic() > deadline:
+            message = (
+                f'the discovery server cannot run: UDP port {network.port} of this host is in use'
+            )
+            advice = (
+                f"'ss -lunp sport = :{network.port}' tells by what; 'port:' is for another one"
+            )
+            raise StartError(message, help=advice)
+        sleep(_POLL_SEC)
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp_socket:
+        try:
+            udp_socket.bind(('', port))
+        except OSError as error:
+            # Any other error is for the server to tell.
+            return error.errno != errno.EADDRINUSE
+    return True
 
 
 def is_on_network() -> bool:

@@ -20,7 +20,7 @@ from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
-from composer.network.local_networks import wait_for_network
+from composer.network.local_networks import wait_for_network, wait_for_port
 from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot_taking import take_snapshot
@@ -83,7 +83,7 @@ def up(  # noqa: PLR0913 - one for each option
 
     Raises:
         RosNotFoundError: There is no rclpy.
-        StartError: The system could not start.
+        StartError: The system could not start, or a port that it needs is in use.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong; or standard
             input is to be watched.
     """
@@ -110,6 +110,7 @@ def up(  # noqa: PLR0913 - one for each option
 
     if not rehearses:
         wait_for_network(context.spec, lambda text: click.echo(text, err=True))
+        wait_for_port(context.spec)
     variables = _find_variables(context.spec, rehearses=rehearses)
     with shell_environment_kept(), environment_set({**find_colour(), **variables}):
         check_shell(variables)
