@@ -11,6 +11,7 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.inference.aliases import find_aliases
 from composer.inference.classes.attribute_stores import CHANGING
 from composer.inference.module_names import ProjectModules
 from composer.python_source.local_names import list_arguments, nested_names, stored_names
@@ -132,6 +133,7 @@ class _FunctionReader:
             if isinstance(node, (*_FUNCTIONS, ast.Lambda)):
                 own |= {each.arg for each in list_arguments(node.args)}
         self._own = own - named
+        self._aliases = find_aliases(self._nodes, self._own)
 
     def read(self) -> list[SharedName]:
         """Note what the function reads and changes; return the functions that it refers to."""
@@ -149,6 +151,8 @@ class _FunctionReader:
     def _note_change(self, node: ast.AST) -> Iterator[ast.AST]:
         """Note what a node changes; yield the parts of it that only lead there."""
         match node:
+            case ast.Name(id=stored, ctx=ast.Store() | ast.Del()) if stored in self._own:
+                return
             case (
                 ast.Name(ctx=ast.Store() | ast.Del()) | ast.Attribute(ctx=ast.Store() | ast.Del())
             ):
@@ -197,21 +201,51 @@ class _FunctionReader:
         if owner is None or first is None or first.arg != name:
             return None
         decorators = {ast.unparse(each) for each in function.definition.decorator_list}
-        methods = {each.name for each in owner.body if isinstance(each, _FUNCTIONS)}
-        # What is stored in `self` is the instance's own: each node has one.
-        is_of_class = 'classmethod' in decorators or attribute in methods
-        if 'staticmethod' in decorators or not is_of_class:
+        if 'staticmethod' in decorators:
             return None
-        return function.module, f'{owner.name}.{attribute}'
+        methods = {each.name for each in owner.body if isinstance(each, _FUNCTIONS)}
+        if 'classmethod' in decorators or attribute in methods:
+            return function.module, f'{owner.name}.{attribute}'
+        return self._find_class_attribute(attribute)
+
+    def _find_class_attribute(self, attribute: str) -> SharedName | None:
+        """Return an attribute that all instances share, of the class of this method or a base.
+
+        What is stored in `self` is the instance's own: each node has one.
+        """
+        module, owner = self._function.module, self._function.owner
+        while owner is not None and not owner.decorator_list:
+            if _is_stored_in_instances(owner, attribute):
+                return None
+            if _is_in_body(owner, attribute):
+                return module, f'{owner.name}.{attribute}'
+            base = self._find_base(module, owner)
+            module, owner = base or (module, None)
+        return None
+
+    def _find_base(self, module: str, owner: ast.ClassDef) -> tuple[str, ast.ClassDef] | None:
+        """Return the one base of a class; `None` if it has others, or none of the project."""
+        source = self._modules.find(module)
+        match owner.bases:
+            case [ast.Name(id=name)] if source is not None and name != owner.name:
+                home = self._find_home((module, name))
+            case _:
+                return None
+        found = self._modules.find(home[0])
+        statements = self._modules.top(found).statements.get(home[1], ()) if found else ()
+        classes = [each for each, _ in statements if isinstance(each, ast.ClassDef)]
+        return (home[0], classes[0]) if len(classes) == 1 else None
 
     def _resolve_name(self, name: str) -> SharedName | None:
         if name in self._own:
-            return None
+            alias = self._aliases.get(name)
+            return self._resolve(alias) if alias is not None else None
         module, source = self._function.module, self._function.source
         found = self._imported(source, name)
         if found is None:
             is_here = name in self._modules.top(source).statements
-            return (module, name) if is_here and not self._is_import(source, name) else None
+            is_own = is_here and not self._is_import(source, name)
+            return self._find_home((module, name)) if is_own else None
         home, _, inner = found.rpartition('.')
         is_name = home and self._modules.find(home) is not None
         return self._find_home((home, inner)) if is_name else None
@@ -220,12 +254,23 @@ class _FunctionReader:
         """Return a name as the module has it that makes it, not one that imports it from there."""
         for _ in range(_MOST_IMPORTS):
             source = self._modules.find(name[0])
+            if source and (other := self._find_alias(source, name[1])):
+                name = name[0], other
+                continue
             found = self._imported(source, name[1]) if source else None
             home, _, inner = (found or '').rpartition('.')
             if not home or self._modules.find(home) is None:
                 break
             name = home, inner
         return name
+
+    def _find_alias(self, source: ModuleSource, name: str) -> str | None:
+        """Return the name at the top of a module that another one there is always the same as."""
+        top = self._modules.top(source).statements
+        match [each for each, _ in top.get(name, ())]:
+            case [ast.Assign(targets=[ast.Name()], value=ast.Name(id=other))] if other in top:
+                return other if other != name else None
+        return None
 
     def _dotted(self, node: ast.AST) -> str | None:
         """Return the full name of the module that an expression stands for, if it may be one."""
@@ -254,3 +299,22 @@ class _FunctionReader:
 
     def _place(self, node: ast.AST) -> Span:
         return self._function.source.place_of(getattr(node, 'lineno', 1))
+
+
+def _is_in_body(owner: ast.ClassDef, attribute: str) -> bool:
+    return any(
+        isinstance(target, ast.Name) and target.id == attribute
+        for statement in owner.body
+        if isinstance(statement, ast.Assign)
+        for target in statement.targets
+    )
+
+
+def _is_stored_in_instances(owner: ast.ClassDef, attribute: str) -> bool:
+    """Return whether a method of a class stores an attribute of this name in anything."""
+    return any(
+        isinstance(node, ast.Attribute)
+        and node.attr == attribute
+        and isinstance(node.ctx, ast.Store | ast.Del)
+        for node in ast.walk(owner)
+    )

@@ -52,6 +52,25 @@ SHARED = [
         'def read(node): return store.STATE',
         'STATE',
     ),
+    # By another name.
+    (
+        "STATE = {}\nALSO = STATE\ndef write(node):\n  mine = ALSO\n  mine['x'] = 1\n"
+        "def read(node): return STATE['x']",
+        'STATE',
+    ),
+    ('import store\ndef write(node):\n  s = store.STATE\n  s[1] = 1\ndef read(node): return store.STATE', 'STATE'),
+    # Of a class, by an instance, or of its base.
+    (
+        'class Robot:\n  poses = []\n  def move(self): self.poses.append(1)\n'
+        'def write(node): Robot.move(Robot())\ndef read(node): return Robot.poses',
+        'Robot.poses',
+    ),
+    (
+        'class Robot:\n  poses = []\n'
+        'class Arm(Robot):\n  def look(self): return self.poses\n'
+        'def write(node): Robot.poses.append(1)\ndef read(node): return Arm.look(Arm())',
+        'Robot.poses',
+    ),
 ]  # fmt: skip
 OWN = [
     # Nobody changes it.
@@ -72,6 +91,17 @@ OWN = [
     # Instances are made with the nodes.
     'class R:\n  def __init__(self): self.n = 0\n  def add(self): self.n += 1\n'
     'def write(node): R().add()\ndef read(node): return R().n',
+    'class R:\n  n = 0\n  def add(self): self.n += 1\n'
+    'def write(node): R.add(R())\ndef read(node): return R.n',
+    'from dataclasses import dataclass, field\n@dataclass\nclass R:\n'
+    '  l: list = field(default_factory=list)\n  def add(self): self.l.append(1)\n'
+    '  def get(self): return self.l\ndef write(node): R.add(R())\ndef read(node): R.get(R())',
+    # What `write` changes may be something else, or a copy.
+    "STATE = {}\ndef write(node):\n  s = STATE\n  s = {}\n  s['x'] = 1\ndef read(node): return STATE",
+    "STATE = {}\ndef write(node):\n  s = dict(STATE)\n  s['x'] = 1\ndef read(node): return STATE",
+    'N = 0\ndef write(node):\n  n = N\n  n += 1\ndef read(node): return N',
+    # Names that stand for each other.
+    'A = B\nB = A\ndef write(node):\n  a = b\n  b = a\n  a[1] = B\ndef read(node): return A',
     # Of Python itself.
     "import os\ndef write(node): os.environ['x'] = '1'\ndef read(node): return os.environ['x']",
 ]  # fmt: skip
