@@ -104,6 +104,11 @@ class Deployment:
                 problems.append(
                     f'host {name}: its Python has no module venv: install python{python}-venv'
                 )
+            if not facts['may_run']:
+                problems.append(
+                    f"host {name}: no program may be run from '{facts['folder']}', whose disk is "
+                    "mounted with noexec: choose a folder on another one by 'folder:'"
+                )
         if problems:
             raise DeployError('\n'.join(problems))
         return self._facts

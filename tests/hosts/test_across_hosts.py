@@ -115,7 +115,7 @@ def test_what_is_down_stays_down_until_it_is_deployed(project):
     done = project.run('down')
     assert (done.returncode, done.stdout) == (0, 'robot@front: stopped\nrobot@rear: stopped\n')
     assert [state[0] for state, _ in project.states()] == ['inactive', 'inactive']
-    journal = ['journalctl', '--user', '--unit=composer-robot@*', f'--since=@{begun}', '-o', 'cat']
+    journal = ['journalctl', '--user-unit=composer-robot@*', f'--since=@{begun}', '-o', 'cat']
     for host in (project.front, project.rear):
         said = host.run(*journal).stdout
         # All its processes have ended by themselves.

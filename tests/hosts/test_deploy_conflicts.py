@@ -75,6 +75,7 @@ def test_a_unit_of_somebody_else_is_not_overwritten(project):
             'rear.python=/home/robot/chatty': 'It printed: hello from bashrc',
         },
         {'front.systemd=system': "for root, and the user of 'front' is not named"},
+        {'front.folder=/home/robot/still/mine': "no program may be run from '/home/robot/still/"},
         {'front.folder=/home/robot/small': 'its disk has 21 MB'},
         {'front.folder=/home/robot/narrow': 'host front: the disk is full'},
     ],
@@ -83,7 +84,8 @@ def test_a_unit_of_somebody_else_is_not_overwritten(project):
 def test_what_a_host_lacks_is_said_before_anything_is_done(project, lacks):
     script = """
         cd /home/robot
-        mkdir -p small narrow
+        mkdir -p small narrow still
+        mountpoint -q still || mount -t tmpfs -o noexec,uid=1777 tmpfs still
         mountpoint -q small || mount -t tmpfs -o size=20m,uid=1777 tmpfs small
         mountpoint -q narrow || mount -t tmpfs -o nr_inodes=60,uid=1777 tmpfs narrow
         printf '#!/bin/sh\\nexec python3 -c "import sys; sys.version_info = (3, 8, 10); exec(sys.argv[1])" "$3"\\n' >old

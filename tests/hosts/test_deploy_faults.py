@@ -58,6 +58,31 @@ def test_a_first_deployment_that_fails_leaves_nothing(project):
     assert project.runs(release_of(project))
 
 
+def test_what_is_killed_on_a_host_comes_back_once(project):
+    project.edit('robot.yaml', '    host: front\n', '    host: front\n    worker: voice\n')
+    project.deploy()
+    unit = 'composer-robot@front.service'
+
+    def find(part):
+        listed = project.front.run('pgrep', '--full', part).stdout.split()
+        return [int(each) for each in listed]
+
+    def kill(part):
+        (pid,) = find(part)
+        project.front.run('kill', '-KILL', str(pid))
+        wait_for(lambda: len(find(part)) == 1 and find(part) != [pid], f'{part} again')
+        project.hears('hello')
+
+    kill('worker_program.py voice')
+    assert project.front.run('systemctl', '--user', 'is-active', unit).stdout == 'active\n'
+    before = find('worker_program.py voice')
+    kill('m composer up')
+    assert len(find('worker_program.py voice')) == 1
+    assert find('worker_program.py voice') != before
+    assert len(find('processes/guardian.py')) == 1
+    wait_for(lambda: 'robot@front  running' in project.run('ps').stdout, 'its answer')
+
+
 def starting(project):
     """Begin a deployment in which the listener takes long to start; return it then."""
     waits = 'import time\n    while not Path.home().joinpath("go").exists(): time.sleep(0.1)'

@@ -46,6 +46,13 @@ _STATE_SEC = 10.0
 _NOT_RUNNING = 'not running'
 # As systemd names them.
 _RUNNING_STATES = ('active', 'reloading')
+# A part that is not on the graph, by the state of its unit. One that has ended by an error is
+# started again after a while.
+_PROBLEMS = {
+    **dict.fromkeys(_RUNNING_STATES, 'no answer'),
+    'activating': 'starting',
+    'failed': 'failed',
+}
 
 
 def ps_across(asked: AskedSystem, *, format_name: str) -> int:
@@ -53,11 +60,12 @@ def ps_across(asked: AskedSystem, *, format_name: str) -> int:
     system, hosts = _read(asked)
     replies = asyncio.run(ask_composer(system, hosts, 'ps', '--format=json'))
     parts = [_part(system, each) for each in replies]
-    silent = _find_silent(system, replies, parts)
+    states = _find_states(system, replies, parts)
     parts = [
-        replace(part, problem='no answer') if reply in silent else part
+        replace(part, problem=_PROBLEMS.get(states.get(reply.host.name, ''), part.problem))
         for part, reply in zip(parts, replies, strict=True)
     ]
+    silent = [each for each in replies if states.get(each.host.name) in _RUNNING_STATES]
     print_systems(parts, format_name=format_name)
     _tell_unreachable(replies)
     for each in silent:
@@ -67,18 +75,17 @@ def ps_across(asked: AskedSystem, *, format_name: str) -> int:
     return ExitCode.FAILED if any(part.status is None for part in parts) else ExitCode.DONE
 
 
-def _find_silent(
+def _find_states(
     system: str, replies: Sequence[Reply], parts: Sequence[RunningSystem]
-) -> list[Reply]:
-    """Return those of parts that are not on the graph, and whose units are active."""
-    found = {
-        reply.host.name: reply
+) -> dict[str, str]:
+    """Return what systemd says of the parts that are not on the graph, by their hosts."""
+    hosts = [
+        reply.host
         for reply, part in zip(replies, parts, strict=True)
         if part.problem == _NOT_RUNNING
-    }
-    hosts = [each.host for each in found.values()]
-    states = asyncio.run(ask_all(hosts, lambda host: state_command(system, host), _STATE_SEC))
-    return [found[each.host.name] for each in states if each.output.strip() in _RUNNING_STATES]
+    ]
+    found = asyncio.run(ask_all(hosts, lambda host: state_command(system, host), _STATE_SEC))
+    return {each.host.name: each.output.strip() for each in found}
 
 
 def _part(system: str, reply: Reply) -> RunningSystem:

@@ -31,6 +31,7 @@ def collect_facts(store: Store, service: Service, transaction: Transaction) -> d
         'hold': str(transaction.hold),
         'user': os.getuid(),
         'free_bytes': store.free_bytes(),
+        'may_run': store.may_run(),
         'ros': sorted(path.parent.name for path in _ROS.glob('*/setup.sh')),
         'systemd_problem': service.why_unusable(),
         'lingers': service.lingers(),

@@ -287,10 +287,18 @@ class Store:
 
     def free_bytes(self) -> int:
         """Return how much the disk of the folder can take."""
+        return shutil.disk_usage(self._find_disk()).free
+
+    def may_run(self) -> bool:
+        """Return whether programs may be run from the folder: its disk may be mounted `noexec`."""
+        return not os.statvfs(self._find_disk()).f_flag & os.ST_NOEXEC
+
+    def _find_disk(self) -> Path:
+        """Return what there is already of the folder."""
         folder = self.folder
         while not folder.exists():
             folder = folder.parent
-        return shutil.disk_usage(folder).free
+        return folder
 
 
 def _list_digests(manifest: dict[str, Any] | None) -> dict[str, str]:
