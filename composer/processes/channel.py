@@ -113,7 +113,7 @@ class Channel:
         """Whether its descriptor is still its own: a behaviour may have closed it."""
         try:
             return os.fstat(self._socket.fileno()).st_ino == self._inode
-        except OSError:
+        except (OSError, ValueError):
             return False
 
     def _send(self, message: tuple[Any, ...]) -> None:
@@ -142,6 +142,9 @@ class Channel:
         for answer in list(self._answers.values()):
             answer.put((_LOST, None))
         self._on_lost()
+        with self._sending:
+            if self.is_intact:
+                self._socket.close()
 
     def _serve(self, number: int, name: str, arguments: tuple[Any, ...]) -> None:
         try:
