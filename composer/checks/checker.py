@@ -51,16 +51,14 @@ from composer.checks.references import (
 from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first, has_errors
 from composer.input_limits import MAX_FINDINGS
-from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import load_declared
-from composer.language.pipeline import load_system
 from composer.python_source.module_finder import ModuleFinder, project_search_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from composer.diagnostics import Diagnostic, SourceFile, Span
+    from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.loaded_system import LoadedSystem
     from composer.rules import Need
 
@@ -261,10 +259,3 @@ def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
         span.column <= place.column < span.column + span.length
         for span in samples.get((place.source, place.line), ())
     )
-
-
-def check_files(paths: Iterable[Path]) -> Iterator[tuple[Path, list[Diagnostic]]]:
-    """Yield each file with its findings."""
-    catalogue = InterfaceCatalogue()
-    for path in paths:
-        yield path, check_system(load_system(path), catalogue)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import composer
-from composer.checks.checker import check_files, check_system
+from composer.checks.checker import check_system
 from composer.cli.common.file_selection import list_systems
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
@@ -74,7 +74,7 @@ def test_many_different_findings_are_found_at_once():
 
 @pytest.mark.parametrize('path', [*sorted((DATA / 'valid').glob('*.yaml')), *SHIPPED], ids=str)
 def test_nothing_is_said_of_a_valid_file(path):
-    ((_, findings),) = check_files([path])
+    findings = check_system(load_system(path), InterfaceCatalogue())
     assert [render_finding(finding) for finding in findings] == []
 
 
@@ -91,7 +91,7 @@ def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
         'x-tick: &tick {period: 1, behaviour: nowhere:tick}\n'
         'nodes: {a: {timers: {one: *tick, two: *tick}}, b: {timers: {three: {<<: *tick}}}}\n'
     )
-    ((_, findings),) = check_files([path])
+    findings = check_system(load_system(path), InterfaceCatalogue())
     assert [(finding.rule, finding.span.line) for finding in findings] == [
         ('unknown-behaviour', 2)
     ]
@@ -100,7 +100,7 @@ def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
 def test_a_bad_namespace_of_the_defaults_is_shown_with_what_lies_in_it(tmp_path):
     file = tmp_path / 'system.yaml'
     file.write_text('version: 1\ndefaults: {namespace: /a-b}\nnodes: {n: {namespace: c}}\n')
-    ((_, said),) = check_files([file])
+    said = check_system(load_system(file), InterfaceCatalogue())
     findings = [each for each in said if each.rule == 'bad-name']
     assert [each.span.line for each in findings] == [3]
     assert [each.span.line for each in findings[0].related] == [2]
@@ -115,5 +115,5 @@ def test_an_argument_whose_expression_fails_is_not_missed_again(tmp_path):
         '  a:\n'
         '    on_start: {behaviour: taking:send, with: {order: "{{ ordr }}"}}\n'
     )
-    ((_, findings),) = check_files([path])
+    findings = check_system(load_system(path), InterfaceCatalogue())
     assert [finding.rule for finding in findings] == ['undefined-name']
