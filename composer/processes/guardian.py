@@ -163,7 +163,7 @@ def find_marked(mark: int) -> dict[int, str]:
         folder = Path('/proc', name)
         # It may have ended, or belong to another user.
         with contextlib.suppress(OSError, ValueError):
-            if int(name) == os.getpid() or read_mark(folder) != mark:
+            if int(name) == os.getpid() or _read_mark(folder) != mark:
                 continue
             command = (folder / 'cmdline').read_bytes()
             if not _is_dead(folder) and _SPARED not in command:
@@ -178,13 +178,8 @@ def _describe(command: bytes) -> str:
     return text if len(text) <= _LONGEST_COMMAND else f'{text[:_LONGEST_COMMAND]}...'
 
 
-def read_mark(folder: Path) -> int:
-    """Return the mark of a process, in its folder of `/proc`.
-
-    Raises:
-        OSError: The process has gone.
-        ValueError: It has no limit of file locks.
-    """
+def _read_mark(folder: Path) -> int:
+    """Return the limit of file locks; raise `ValueError` if there is none."""
     _, _, rest = (folder / 'limits').read_text().partition('Max file locks')
     return int(rest.split()[0])
 

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 import threading
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,7 @@ from composer.errors import ExitCode
 from composer.language.specs import DEFAULT_RESTART_DELAY_SEC, ProcessSpec
 from composer.processes.channel import Channel
 from composer.processes.external_process import ExternalProcess
-from composer.processes.guardian import kill_marked, read_mark
+from composer.processes.guardian import kill_marked
 from composer.processes.supervisor import Launch, ProcessSupervisor, Tools
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ class ConnectedProcess(ExternalProcess):
     Attributes:
         channel: The connection to its last run; `None` before the first.
         functions: What the worker may call.
-        mark: What marks the processes that its behaviours start, once it is up; 0 for nothing.
+        mark: What marks the processes that its behaviours start; 0 for nothing.
     """
 
     def __init__(self, spec: WorkerSpec, functions: Functions) -> None:
@@ -46,12 +45,6 @@ class ConnectedProcess(ExternalProcess):
         self.channel: Channel | None = None
         self.functions = functions
         self.mark = 0
-
-    def learn_mark(self) -> None:
-        """Learn how its process has marked itself."""
-        if self.run is not None:
-            with suppress(OSError, ValueError):
-                self.mark = read_mark(Path(f'/proc/{self.run.pid}'))
 
 
 class WorkerSupervisor(ProcessSupervisor):
@@ -88,17 +81,18 @@ class WorkerSupervisor(ProcessSupervisor):
 
     def _after_end(self, run: ProcessRun, code: int) -> None:
         is_expected = run.process.is_leaving or self._stopping.is_set()
+        if not is_expected:
+            self.on_end(run.process)
+        # One that was told to stop has done so itself, unless it hung.
+        self._end_marked(run.process)
         # SIGTERM hurries those that have stopped already.
         if is_expected and (run.is_given_up or code in (ExitCode.DONE, -signal.SIGTERM)):
             return
-        if not is_expected:
-            self.on_end(run.process)
-        self._end_marked(run.process)
         super()._after_end(run, code)
 
     @staticmethod
     def _end_marked(process: ExternalProcess) -> None:
-        """Kill what behaviours of a worker have started that has ended by itself."""
+        """Kill what behaviours of a worker have started, which has ended."""
         if isinstance(process, ConnectedProcess) and process.mark:
             mark, process.mark = process.mark, 0
             kill_marked(mark, f"worker '{process.spec.name}'")

@@ -23,6 +23,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from composer.runtime import stop
 
@@ -56,6 +57,13 @@ def start(node, deaf=False):
         if os.fork() == 0:
             stay()
         os._exit(0)
+
+def start_once(node):
+    start(node)
+    again = Path(__file__).with_name('again')
+    if again.exists():
+        raise RuntimeError('again')
+    again.touch()
 """
 STARTED = 6
 STARTING = 'version: 1\nexecutor: {{shutdown_timeout: {}}}\nnodes: {{n: {{on_start: {}}}}}\n'
@@ -215,6 +223,19 @@ def test_processes_of_behaviours_end_with_a_worker_that_is_killed(compose, wait_
     wait_for(lambda: not any(map(is_alive, pids)), 'their end')
     for pid in pids:
         assert child.wait_for_line(f'process {pid} (').endswith(" outlived worker 'w': killed")
+    assert child.stop() == 0
+
+
+def test_processes_of_behaviours_end_with_a_worker_that_cannot_start_again(compose, wait_for):
+    text = STARTING.format(30, 'parts:start_once').replace('on_', 'worker: w, on_')
+    child = compose(text + 'workers: {w: {restart: {delay: 0.1, max: 1}}}\n', CODE)
+    started_by(child)
+    os.kill(worker_of(child), signal.SIGKILL)
+
+    # Those of the second start; some of them end before they say anything.
+    child.wait_for_line(" outlived worker 'w': killed", times=STARTED + 1)
+    pids = {int(line.split()[-2]) for line in child.matching(' stays')}
+    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
     assert child.stop() == 0
 
 

@@ -101,9 +101,12 @@ class Worker:
         if step == 'create':
             arguments = (self.assignment,)
         try:
-            return self.call(step, *arguments)
+            result = self.call(step, *arguments)
         except ChannelLostError as error:
             raise StartError(self.describe_failed_start()) from error
+        if step == 'create':
+            self.process.mark = result
+        return result
 
     def import_behaviours(self) -> dict[str, Any]:
         """Have its process import what comes next.
@@ -146,7 +149,6 @@ class Worker:
     def keep_to_rules(self) -> None:
         """Have its process started again as the file says."""
         self.process.change(worker_rules(self.spec))
-        self.process.learn_mark()
 
     def stop(self, timeout_sec: float) -> tuple[int, bool]:
         """Stop its nodes and end its process.

@@ -161,8 +161,8 @@ class WorkerProcess:
         with suppress(_UnwantedError), self._fresh.pop_all():
             raise _UnwantedError
 
-    def create(self, assignment: Assignment) -> None:
-        """Create the nodes.
+    def create(self, assignment: Assignment) -> int:
+        """Create the nodes; return what marks the processes that their behaviours start.
 
         Raises:
             StartError: One of them cannot be created.
@@ -173,6 +173,7 @@ class WorkerProcess:
         self._system = WorkerSystem(assignment, self._functions, self._channel)
         threading.Thread(target=self._wait, name='worker', daemon=True).start()
         self._system.create()
+        return self._system.mark
 
     def _wait(self) -> None:
         system = self._running

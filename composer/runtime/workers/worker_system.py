@@ -67,6 +67,11 @@ class WorkerSystem(LocalPart):
         self._worker = spec
         self._executor.limit_threads(self._most_threads)
 
+    @property
+    def mark(self) -> int:
+        """What marks the processes that behaviours start here; 0 for nothing."""
+        return self._guardian.mark
+
     def shutdown(self, code: int) -> None:
         """Ask for the end of the whole system."""
         self._channel.tell('request_stop', code)
