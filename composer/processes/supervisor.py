@@ -14,9 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
 from composer.processes.external_process import ExternalProcess, ProcessRun, describe_end
-from composer.processes.process_commands import CommandWriter, find_folder
-from composer.processes.process_folder import ProcessFolder
-from composer.processes.process_output import ProcessOutputs
 from composer.processes.reaper_client import ReaperConnection
 from composer.programs import base_environment
 from composer.records import record
@@ -185,6 +182,8 @@ class ProcessSupervisor:
 
     def _prepare(self, process: ExternalProcess, tools: Tools) -> Launch:
         """Return what a process is started with."""
+        from composer.processes.process_commands import find_folder
+
         spec = process.spec
         environment = {**base_environment(os.environ), **spec.env}
         command, folder = tools.commands.write(spec, environment), find_folder(spec)
@@ -348,6 +347,11 @@ class Tools:
         ros_arguments: Sequence[str],
         log_levels: Sequence[str],
     ) -> None:
+        # A worker has no processes, and starts faster without these.
+        from composer.processes.process_commands import CommandWriter
+        from composer.processes.process_folder import ProcessFolder
+        from composer.processes.process_output import ProcessOutputs
+
         self._folder = ProcessFolder()
         self.commands = CommandWriter(self._folder.path, ros_arguments, log_levels)
         self.outputs = ProcessOutputs()

@@ -9,7 +9,7 @@ alone waits for nobody.
 from __future__ import annotations
 
 import json
-import secrets
+import os
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -94,7 +94,7 @@ class Rivals:
         from std_msgs.msg import String
 
         self._message_class = String
-        self._standing = Standing(secrets.token_hex(8), begun)
+        self._standing = Standing(os.urandom(8).hex(), begun)
         self._about = about
         self._refused = refused
         # What is told was so before it gave way.

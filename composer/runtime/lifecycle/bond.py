@@ -7,7 +7,6 @@ name, as the nodes of nav2 do. As there, the node does not mind that its manager
 from __future__ import annotations
 
 import threading
-import uuid
 from contextlib import suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
@@ -52,7 +51,9 @@ class Bond:
             if self._ends is not None:
                 return
             ros, group, kind = self._node.ros, self._node.background, import_interface(_TYPE)
-            self._instance = str(uuid.uuid4())
+            from uuid import uuid4  # Few nodes have a bond.
+
+            self._instance = str(uuid4())
             self._begun = monotonic()
             self._is_alive, self._has_sister = True, False
             publisher = ros.create_publisher(kind, _TOPIC, QoSProfile(depth=_PUBLISHED_DEPTH))

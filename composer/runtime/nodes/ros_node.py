@@ -43,7 +43,6 @@ from rclpy.parameter_service import ParameterService
 
 from composer.ament import remaps_actions
 from composer.names import expand_name
-from composer.ros_parameters.overrides import find_names_given
 from composer.runtime.logs import has_rosout_publisher
 
 if TYPE_CHECKING:
@@ -83,7 +82,11 @@ class ComposedRosNode(Node):
         ros_arguments: Sequence[str],
         entries: Mapping[str, ParameterEntry],
     ) -> None:
-        given = find_names_given(ros_arguments, spec.full_name)
+        given: set[str] = set()
+        if ros_arguments:
+            from composer.ros_parameters.overrides import find_names_given
+
+            given = find_names_given(ros_arguments, spec.full_name)
         self.from_files = {name: entries[name] for name in entries if name not in given}
         self._late_events: _LatePublisher | None = None
         hooks = spec.before_parameters_set, spec.on_parameters, spec.after_parameters_set
