@@ -88,6 +88,7 @@ class Bundle:
             composer=self._composer,
             variables=ros_variables(spec),
             start=encode_snapshot(keep_start(snapshot)),
+            hosts=choose_hosts(self._context.spec),
         )
         return build_part(sources, facts)
 

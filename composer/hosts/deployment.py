@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from composer.errors import ComposerError
 from composer.hosts.agent_client import HostAgent
 from composer.hosts.host_parts import unit_of
-from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host
+from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host, plan_removal
+from composer.hosts.left_hosts import Candidates, has_part
 from composer.hosts.moves import order_changes, settle_exchanges
 from composer.network.clock_skew import describe_skew, measure_skew
 from composer.planning.text import STARTS_AGAIN
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+    from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
 
     from composer.hosts.host_parts import Part
     from composer.language.specs import HostSpec
@@ -119,26 +120,90 @@ class Deployment:
         Raises:
             DeployError: There is one under way.
         """
-        owner = f'{getpass.getuser()}@{socket.gethostname()} (process {os.getpid()})'
-        await self._each(lambda agent: agent.call('lock', owner=owner))
+        await self._each(_lock)
 
     async def repair(self) -> None:
         """Take back what a deployment has left that was cut off."""
+        await self._each(self._repair)
 
-        async def repair(agent: HostAgent) -> None:
+    async def _repair(self, agent: HostAgent) -> None:
+        name = agent.host.name
+        if self._facts[name]['is_pending']:
+            told = await agent.call('roll_back')
+            self._tell(f'{name}: an earlier deployment was cut off: {told}')
+            self._facts[name] = await agent.call('look')
+
+    async def find_left(
+        self,
+        inventory: Mapping[str, HostSpec],
+        wanted: Collection[str],
+        leave: Collection[str],
+        *,
+        locks: bool,
+    ) -> None:
+        """Find the hosts that have a part of the system, and are to have none any more.
+
+        They are those of the inventory, and those that the releases on the other hosts name.
+
+        Args:
+            wanted: The names of those to change; empty for all.
+            leave: The names of those to leave as they are.
+            locks: Whether to lock them, and to take back what was cut off there.
+
+        Raises:
+            DeployError: One that may have a part cannot be asked.
+        """
+        candidates = Candidates(self._facts, inventory, wanted)
+        hosts = candidates.list_asked(leave)
+        asked = [HostAgent(host) for host in hosts]
+        for agent in asked:
+            # They are closed with the others.
+            self._agents[agent.host.name] = agent
+
+        async def ask(agent: HostAgent) -> None:
             name = agent.host.name
-            if self._facts[name]['is_pending']:
-                told = await agent.call('roll_back')
-                self._tell(f'{name}: an earlier deployment was cut off: {told}')
-                self._facts[name] = await agent.call('look')
+            facts = await self._ask(agent, is_must=name in candidates.musts)
+            if facts is not None and has_part(facts, self._system, name):
+                self._facts[name] = facts
+                if locks:
+                    await _lock(agent)
+                    self._facts[name] = await agent.call('look')
+                    await self._repair(agent)
+                if has_part(self._facts[name], self._system, name):
+                    return
+                del self._facts[name]
+            if facts is not None and name in wanted:
+                self._tell(f'{name}: there is nothing of {self._system}')
+            await self._agents.pop(name).close()
 
-        await self._each(repair)
+        await self._each(ask, asked)
+
+    async def _ask(self, agent: HostAgent, *, is_must: bool) -> Mapping[str, Any] | None:
+        """Return what a host says of itself that has no part; `None` if it cannot be asked."""
+        name = agent.host.name
+        try:
+            await self._open(agent)
+            facts: Mapping[str, Any] = await agent.call('look')
+        except ComposerError as error:
+            unknown = f'whether {self._system} still runs there is not known'
+            if not is_must:
+                self._tell(f'warning: {error}: {unknown}')
+                return None
+            message = f'{error}: {unknown}'
+            advice = f"'--leave {name}' leaves it as it is, and forgets it"
+            helps = filter(None, [error.help, advice])
+            raise DeployError(message, help='\n'.join(helps)) from error
+        return facts
 
     def plan(self, parts: Mapping[str, Part]) -> list[HostPlan]:
         """Return what is to be done on each host."""
-        return settle_exchanges(
-            [plan_host(parts[name], facts) for name, facts in self._facts.items()]
-        )
+
+        def plan(name: str, facts: Mapping[str, Any]) -> HostPlan:
+            if name in parts:
+                return plan_host(parts[name], facts)
+            return plan_removal(self._agents[name].host, facts)
+
+        return settle_exchanges([plan(*each) for each in self._facts.items()])
 
     def check(self, plans: Sequence[HostPlan]) -> None:
         """Check that nothing stands against the plans.
@@ -185,7 +250,7 @@ class Deployment:
             await each(self._hold)
             await each(lambda agent: agent.call('let_go'))
             await each(self._wait_until_up)
-            await each(lambda agent: agent.call('confirm'))
+            await each(lambda agent: self._confirm(agent, changed[agent.host.name]))
         except BaseException as error:
             told = await asyncio.shield(self._roll_back(groups[::-1]))
             if not isinstance(error, ComposerError):
@@ -193,9 +258,11 @@ class Deployment:
                     self._tell(line)
                 raise
             raise DeployError('\n'.join([str(error), *told]), help=error.help) from error
-        await asyncio.shield(self._commit(agents))
+        await asyncio.shield(self._commit(changed))
 
     async def _prepare(self, agent: HostAgent, plan: HostPlan) -> None:
+        if plan.action == 'remove':
+            return
         part, name = plan.part, agent.host.name
         for digest in plan.blobs:
             await agent.bring('receive', digest, part.blobs[digest])
@@ -220,6 +287,10 @@ class Deployment:
 
     async def _switch(self, agent: HostAgent, plan: HostPlan) -> None:
         part, name = plan.part, agent.host.name
+        if plan.action == 'remove':
+            await agent.call('leave')
+            self._tell(f'{name}: stopped')
+            return
         release = self._releases[name]
         if plan.action == 'reload':
             told, starts_again = await agent.call(
@@ -247,6 +318,10 @@ class Deployment:
             await agent.call('wait_until_up', timeout_sec=_UP_SEC)
             self._tell(f'{agent.host.name}: up')
 
+    async def _confirm(self, agent: HostAgent, plan: HostPlan) -> None:
+        if plan.action != 'remove':
+            await agent.call('confirm')
+
     async def _roll_back(self, groups: Iterable[Iterable[HostAgent]]) -> list[str]:
         """Take back what was done, a group after the other; return what became of each host."""
 
@@ -263,13 +338,22 @@ class Deployment:
         told = [await asyncio.gather(*map(roll_back, group)) for group in groups]
         return [line for lines in told for line in lines]
 
-    async def _commit(self, agents: Iterable[HostAgent]) -> None:
-        found = await asyncio.gather(
-            *(agent.call('commit') for agent in agents), return_exceptions=True
-        )
+    async def _commit(self, plans: Mapping[str, HostPlan]) -> None:
+
+        async def commit(name: str) -> None:
+            agent = self._agents[name]
+            if plans[name].action == 'remove':
+                await self._remove(agent)
+            else:
+                await agent.call('commit')
+
+        found = await asyncio.gather(*map(commit, plans), return_exceptions=True)
         errors = [str(each) for each in found if isinstance(each, ComposerError)]
         if errors:
-            errors.append('It may run the release before: deploy again when it is back.')
+            errors.append(
+                'It may run the release before: deploy again when it is back, with its name '
+                'in the inventory.'
+            )
             raise DeployError('\n'.join(errors))
 
     async def remove(self) -> None:
@@ -280,12 +364,15 @@ class Deployment:
             if self._facts[name]['release'] is None:
                 self._tell(f'{name}: there is nothing of {self._system}')
                 return
-            left = await agent.call('remove')
-            self._tell(f'{name}: removed')
-            for path in left:
-                self._tell(f'{name}: {path} was edited there, and is kept')
+            await self._remove(agent)
 
         await self._each(remove)
+
+    async def _remove(self, agent: HostAgent) -> None:
+        left = await agent.call('remove')
+        self._tell(f'{agent.host.name}: removed')
+        for path in left:
+            self._tell(f'{agent.host.name}: {path} was edited there, and is kept')
 
     async def _each(
         self,
@@ -307,3 +394,8 @@ class Deployment:
             helps = dict.fromkeys(filter(None, (getattr(each, 'help', None) for each in errors)))
             raise DeployError('\n'.join(map(str, errors)), help='\n'.join(helps) or None)
         return [each for each in found if not isinstance(each, BaseException)]
+
+
+async def _lock(agent: HostAgent) -> None:
+    owner = f'{getpass.getuser()}@{socket.gethostname()} (process {os.getpid()})'
+    await agent.call('lock', owner=owner)

@@ -8,6 +8,8 @@ import shlex
 from typing import TYPE_CHECKING, Any
 
 from composer.export.systemd import render_unit, unit_name
+from composer.hosts.wheels import Wheel
+from composer.language.specs import HostSpec
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -15,10 +17,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.hosts.project_files import ProjectFiles
-    from composer.hosts.wheels import Wheel
-    from composer.language.specs import HostSpec, SystemSpec
+    from composer.language.specs import SystemSpec
 
 UNIT_COMMENT = "Written by 'composer deploy', which stops if somebody has edited it."
+_REACHED_BY = ('address', 'user', 'port', 'python', 'identity_file', 'folder', 'systemd')
 _MODE, _PROGRAM_MODE = 0o644, 0o755
 # The stop of a system, and then its exit.
 _EXIT_SEC = 15.0
@@ -87,6 +89,7 @@ class PartSources:
         required: Wheels of what is required, by what they are of.
         variables: What the environment says of ROS.
         start: What a system that runs starts again for, as `encode_snapshot` writes it.
+        hosts: All that have a part of the system.
     """
 
     spec: SystemSpec
@@ -98,6 +101,7 @@ class PartSources:
     composer: Wheel
     variables: Mapping[str, str]
     start: Mapping[str, Any]
+    hosts: Sequence[HostSpec]
 
 
 def unit_of(system: str, host: HostSpec) -> str:
@@ -153,6 +157,7 @@ def build_part(sources: PartSources, facts: Mapping[str, Any]) -> Part:
         'composer': composer,
         'interfaces': sorted(spec.interfaces),
         'start': sources.start,
+        'hosts': {each.name: _keep_host(each) for each in sources.hosts},
         'runs': sorted([*spec.nodes, *(f'process {each}' for each in spec.processes)]),
         'unit_digest': hashlib.sha256(unit.encode()).hexdigest(),
     }
@@ -168,6 +173,25 @@ def build_part(sources: PartSources, facts: Mapping[str, Any]) -> Part:
         start=_START.format(root=shlex.quote(facts['root'])),
         build=('interfaces', 'build', sources.words[0]) if spec.interfaces else (),
     )
+
+
+def part_of_nothing(host: HostSpec, name: str) -> Part:
+    """Return what a host has that is to run nothing any more."""
+    nothing = Wheel('', b'', {})
+    return Part(host, name, {}, {}, {}, nothing, sees_system=False, unit='', start='', build=())
+
+
+def _keep_host(host: HostSpec) -> dict[str, Any]:
+    """Return how a host is reached, as `read_hosts` reads it."""
+    return {each: getattr(host, each) for each in _REACHED_BY}
+
+
+def read_hosts(manifest: Mapping[str, Any] | None) -> dict[str, HostSpec]:
+    """Return the hosts that had a part of the system when a release was brought."""
+    kept = (manifest or {}).get('hosts', {})
+    return {
+        name: HostSpec(name=name, description='', path=(), **entry) for name, entry in kept.items()
+    }
 
 
 def _render_run(

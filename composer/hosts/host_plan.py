@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.hosts.host_parts import UNIT_COMMENT
+from composer.hosts.host_parts import UNIT_COMMENT, part_of_nothing
 from composer.planning.differences import find_new_start
 from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.hosts.host_parts import Part
+    from composer.language.specs import HostSpec
 
-Action: TypeAlias = Literal['start', 'restart', 'reload', 'nothing']
+Action: TypeAlias = Literal['start', 'restart', 'reload', 'remove', 'nothing']
 
 _MEGABYTE = 1_000_000
 # Installed, a wheel takes about this many times its size.
@@ -90,6 +91,24 @@ def plan_host(part: Part, facts: Mapping[str, Any]) -> HostPlan:
         conflicts=tuple(_find_conflicts(part, facts)),
         leaving=runs - is_to_run,
         coming=is_to_run - runs,
+    )
+
+
+def plan_removal(host: HostSpec, facts: Mapping[str, Any]) -> HostPlan:
+    """Return what must be done on a host that has a part, and is to have none any more."""
+    manifest = facts['manifest']
+    return HostPlan(
+        part=part_of_nothing(host, manifest['part']),
+        changes=tuple(('-', each) for each in manifest['runs']),
+        action='remove',
+        reason='nothing of the system is to run there any more',
+        blobs=(),
+        wheels=(),
+        has_composer=True,
+        needed_bytes=0,
+        conflicts=(),
+        leaving=frozenset(manifest['runs']),
+        coming=frozenset(),
     )
 
 
@@ -173,6 +192,11 @@ def _find_conflicts(part: Part, facts: Mapping[str, Any]) -> Iterator[str]:
     for name, digest in facts['edited'].items():
         if new.get(name) != digest:
             yield f'{facts["root"]}/live/{name} was edited there'
+    if manifest is not None and manifest['part'] != part.name:
+        yield (
+            f"{facts['root']} is of '{manifest['part']}', by another name of this host: remove "
+            "that first, by 'composer deploy … --remove' with the files that have the name"
+        )
     if facts['is_foreign']:
         yield f'{facts["root"]} is there, and was not written by Composer'
     if facts['unit'] is not None and facts['unit'] != part.unit:

@@ -73,6 +73,46 @@ def test_a_node_that_moves_leaves_the_one_host_before_it_comes_to_the_other(proj
     assert project.pids() == pids
 
 
+def test_a_host_that_is_left_stops_unless_all_go_back(project):
+    release = release_of(project)
+    project.edit('robot.yaml', 'host: rear', 'host: front')
+    project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 24')
+    project.edit('hosts.yaml', ', rear: {address: rear}', '')
+    project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
+    told = project.fail()
+    assert 'rear: stopped\n' in told
+    assert '  rear: the release before was restored' in told
+    assert project.runs(release)
+    project.rear.lose(100)
+    told = project.fail()
+    project.rear.lose(0)
+    assert 'host rear (rear) cannot be reached: ' in told
+    assert "help: '--leave rear' leaves it as it is, and forgets it" in told
+    assert 'rear' not in project.deploy('--plan', '--leave', 'rear').stdout
+    assert project.runs(release)
+    project.hears('hello')
+    project.edit('behaviours/counting.py', "raise ValueError('no sensor')", 'pass')
+    project.edit('robot.yaml', 'domain_id: 24', 'domain_id: 20')
+    done = project.deploy()
+    plan = 'rear: remove (nothing of the system is to run there any more)\n  - listener\n'
+    assert plan in done.stdout
+    assert done.stderr.index('rear: stopped') < done.stderr.index('front: reloaded')
+    assert done.stderr.endswith('rear: removed\nrobot: 2 hosts changed\n')
+    wait_for(lambda: project.front.run('cat', 'heard').stdout == 'hello', 'the listener')
+    assert project.state('rear')[0] == ('inactive', '', '', False)
+    assert project.rear.run('ls', FOLDER).returncode
+
+
+def test_a_host_of_the_inventory_that_is_left_can_be_stopped(project):
+    project.edit('robot.yaml', 'host: rear', 'host: front')
+    assert project.run('down', '--host', 'rear').stdout == 'robot@rear: stopped\n'
+    assert [state[0] for state, _ in project.states()] == ['active', 'inactive']
+    assert project.deploy('--remove', '--host', 'rear').stderr == 'rear: removed\n'
+    assert project.rear.run('ls', FOLDER).returncode
+    told = 'rear: there is nothing of robot\n'
+    assert project.deploy('--remove', '--host', 'rear').stderr == told
+
+
 def test_the_system_survives_a_boot(project):
     release = release_of(project)
     project.front.kill()

@@ -89,6 +89,7 @@ def part_of_front(folder):
         composer=Wheel('composer.whl', b'', {}),
         variables=ros_variables(spec),
         start=encode_snapshot(keep_start(take_snapshot(context))),
+        hosts=list(spec.hosts.values()),
     )
     return build_part(sources, FACTS)
 

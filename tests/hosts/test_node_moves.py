@@ -19,6 +19,7 @@ CASES = {
         {'a': ('restart', '', 'x'), 'b': ('reload', 'x', '')},
         ['a! b', ''],
     ),
+    'from one that is left': ({'a': ('reload', '', 'x'), 'b': ('remove', 'x', '')}, ['b', 'a']),
     'an exchange': ({'a': ('reload', 'x', 'y'), 'b': ('reload', 'y', 'x')}, ['a! b!', '']),
     'a chain': (
         {'a': ('reload', 'x', ''), 'b': ('reload', 'y', 'x'), 'c': ('reload', '', 'y')},

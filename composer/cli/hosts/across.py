@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 
 _STOP_SEC = 60.0
 _STATE_SEC = 10.0
+# What systemctl says of a unit that it does not know.
+_NO_UNIT = 5
 _NOT_RUNNING = 'not running'
 # As systemd names them.
 _RUNNING_STATES = ('active', 'reloading')
@@ -136,10 +138,18 @@ def reload_across(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool)
 
 def down_across(asked: AskedSystem, timeout_sec: float) -> int:
     """Stop each part, until its host starts again or is deployed to; return the exit code."""
-    system, hosts = _read(asked)
+    system, hosts, others = _read_all(asked)
     replies = asyncio.run(
-        ask_all(hosts, lambda host: stop_command(system, host), timeout_sec + _STOP_SEC)
+        ask_all(
+            [*hosts, *others], lambda host: stop_command(system, host), timeout_sec + _STOP_SEC
+        )
     )
+    asked_first, more = replies[: len(hosts)], replies[len(hosts) :]
+    for each in more:
+        if each.code is None:
+            unknown = f'whether {escape(system)} still runs there is not known'
+            click.echo(f'warning: {escape(each.error)}: {unknown}', err=True)
+    replies = [*asked_first, *(each for each in more if each.code not in (None, _NO_UNIT))]
     for each in replies:
         if each.code == 0:
             click.echo(f'{escape(system)}@{escape(each.host.name)}: stopped')
@@ -165,7 +175,13 @@ def logs_across(asked: AskedSystem, *, follows: bool) -> int:
 
 
 def _read(asked: AskedSystem) -> tuple[str, list[HostSpec]]:
-    """Return the name of a system, and its hosts.
+    """Return the name of a system, and its hosts; see `_read_all`."""
+    system, hosts, _ = _read_all(asked)
+    return system, hosts
+
+
+def _read_all(asked: AskedSystem) -> tuple[str, list[HostSpec], list[HostSpec]]:
+    """Return the name of a system, the hosts that have a part, and those that may have had one.
 
     Raises:
         ComposerError: The file has errors, or no hosts.
@@ -177,7 +193,13 @@ def _read(asked: AskedSystem) -> tuple[str, list[HostSpec]]:
         show_findings(system.diagnostics)
         message = f"'{paths[0]}' has errors"
         raise ComposerError(message)
-    return system.spec.name, choose_hosts(system.spec, asked.hosts)
+    spec, hosts = system.spec, choose_hosts(system.spec, asked.hosts)
+    others = [
+        host
+        for name, host in spec.hosts.items()
+        if host not in hosts and (not asked.hosts or name in asked.hosts)
+    ]
+    return spec.name, hosts, others
 
 
 def escape_each(text: str) -> str:

@@ -25,10 +25,18 @@ from composer.cli.common.argument_types import (
 @click.option(
     '--remove', 'removes', is_flag=True, help='Stop the system, and remove it from its hosts.'
 )
+@click.option(
+    '--leave',
+    'leave',
+    multiple=True,
+    metavar='NAME',
+    help='Leave this host, which is to run nothing any more, as it is. Can be repeated.',
+)
 def deploy_command(
     words: tuple[str, ...],
     set_values: tuple[str, ...],
     hosts: tuple[str, ...],
+    leave: tuple[str, ...],
     *,
     only_plans: bool,
     removes: bool,
@@ -37,13 +45,16 @@ def deploy_command(
 
     Each host gets its part: files, behaviours, and the packages that it lacks; and a unit of
     systemd that runs it, from each boot on. Only what has changed is brought. All hosts change
-    together: if one fails, all go back. No file is overwritten that somebody edited there.
+    together: if one fails, all go back. No file is overwritten that somebody edited there. A host
+    that nothing is to run on any more has its part stopped and removed.
     """
     refuse_together({'--plan': only_plans, '--remove': removes})
     from composer.cli.hosts.deploy import deploy
 
     paths, arguments = split_words(words)
-    return deploy(paths, arguments, set_values, hosts, only_plans=only_plans, removes=removes)
+    return deploy(
+        paths, arguments, set_values, hosts, leave, only_plans=only_plans, removes=removes
+    )
 
 
 COMMANDS = (deploy_command,)

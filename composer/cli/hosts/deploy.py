@@ -39,6 +39,7 @@ def deploy(
     words: Sequence[str],
     set_values: Sequence[str],
     hosts: Sequence[str],
+    leave: Sequence[str] = (),
     *,
     only_plans: bool,
     removes: bool,
@@ -50,6 +51,7 @@ def deploy(
         words: Values for the arguments that the file declares.
         set_values: Values to change.
         hosts: The names of those to change; empty for all.
+        leave: The names of hosts without anything to run that are left as they are.
         only_plans: Whether to show what would be done only.
         removes: Whether to remove the system.
 
@@ -62,10 +64,10 @@ def deploy(
         return ExitCode.FAILED
     chosen = choose_hosts(context.spec, hosts)
     if removes:
-        return _run(_remove(context.spec.name, chosen))
+        return _run(_remove(context.spec, chosen, hosts, leave))
     settings = [f'--set={each}' for each in (*set_values, *find_addresses(context.spec))]
     bundle = Bundle(context, paths, list_files(context), [*words, *settings])
-    return _run(_deploy(context.spec.name, chosen, bundle, only_plans=only_plans))
+    return _run(_deploy(context.spec, chosen, hosts, leave, bundle, only_plans=only_plans))
 
 
 def _run(work: Coroutine[Any, Any, None]) -> int:
@@ -129,14 +131,22 @@ def find_addresses(spec: SystemSpec) -> Iterator[str]:
 
 
 async def _deploy(
-    system: str, hosts: Sequence[HostSpec], bundle: Bundle, *, only_plans: bool
+    spec: SystemSpec,
+    hosts: Sequence[HostSpec],
+    wanted: Sequence[str],
+    leave: Sequence[str],
+    bundle: Bundle,
+    *,
+    only_plans: bool,
 ) -> None:
+    system = spec.name
     async with Deployment(system, hosts, _tell) as deployment:
         if not only_plans:
             await deployment.lock()
         facts = await deployment.look()
         if not only_plans:
             await deployment.repair()
+        await deployment.find_left(spec.hosts, wanted, leave, locks=not only_plans)
         plans = deployment.plan(bundle.build(hosts, facts))
         for each in plans:
             click.echo('\n'.join(map(escape, render_plan(each))))
@@ -148,10 +158,13 @@ async def _deploy(
     _tell(f'{system}: {_count(busy)} changed' if busy else f'{system}: nothing to change')
 
 
-async def _remove(system: str, hosts: Sequence[HostSpec]) -> None:
-    async with Deployment(system, hosts, _tell) as deployment:
+async def _remove(
+    spec: SystemSpec, hosts: Sequence[HostSpec], wanted: Sequence[str], leave: Sequence[str]
+) -> None:
+    async with Deployment(spec.name, hosts, _tell) as deployment:
         await deployment.lock()
         await deployment.look()
+        await deployment.find_left(spec.hosts, wanted, leave, locks=True)
         await deployment.remove()
 
 

@@ -155,7 +155,11 @@ class Transaction:
             return run(command, timeout_sec=timeout_sec + 30.0).strip()
         except HostError as error:
             message = 'the system that runs cannot become the new one'
-            raise HostError(message, error.help) from error
+            raise HostError(message, error.help or str(error)) from error
+
+    def leave(self) -> None:
+        """Stop the system, which is to run here no more; `remove` commits that."""
+        self._service.stop()
 
     def commit(self) -> None:
         """Keep what has been changed."""

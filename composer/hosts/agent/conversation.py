@@ -72,6 +72,7 @@ class Conversation:
             'wait_until_up': transaction.wait_until_up,
             'reload': transaction.reload,
             'confirm': transaction.confirm,
+            'leave': transaction.leave,
             'commit': transaction.commit,
             'roll_back': self._roll_back,
             'remove': transaction.remove,
