@@ -84,7 +84,9 @@ def test_a_second_deployment_is_told_whose_the_first_one_is(store, tmp_path):
 def test_what_others_have_put_there_is_kept(store):
     deploy(store, {'a': b'1', 'folder/b': b'2'})
     foreign = ('live/folder/mine', 'map', 'maps/one')
-    for name in (*foreign, 'live/__pycache__/a.pyc'):
+    # A start that goes back copies all of a release.
+    copied = ('live/__pycache__/a.pyc', 'live/wheels/a.whl', 'live/manifest.json')
+    for name in (*foreign, *copied):
         (store.root / name).parent.mkdir(parents=True, exist_ok=True)
         (store.root / name).write_bytes(name.encode())
     edited = store.folder / 'edited/robot'

@@ -119,7 +119,9 @@ class Store:
             top, *inner = path.relative_to(self.root).parts
             is_live = top == self.live.name
             name = '/'.join(inner if is_live else (top, *inner))
-            is_brought = top in _BROUGHT or (is_live and name in own)
+            # A start that goes back copies all of a release.
+            is_own = name in own or inner[:1] in (['wheels'], [_MANIFEST])
+            is_brought = top in _BROUGHT or (is_live and is_own)
             if is_brought or path.is_dir() or '__pycache__' in inner:
                 continue
             target = self.folder / 'edited' / self.system / name
