@@ -1,7 +1,8 @@
 """The files of a system with every kind of entity, from which random edits begin.
 
-A behaviour notes in its `own_state` how often it has run, and on what code. The node `witness` is
-never edited itself: what it does must pass through all edits of others.
+A behaviour notes in its `own_state` how often it has run, and on what code. The nodes
+`witness` and `witness_afar`, which is in a worker, are never edited themselves: what they do must
+pass through all edits of others.
 """
 
 PARTS = """
@@ -180,6 +181,10 @@ def hear(node, message):
     node.state.heard.append(message.data)
 
 
+def hear_afar(node, message):
+    node.state.heard_afar.append(message.data)
+
+
 def hold(node, message):
     while not node.state.released:
         time.sleep(0.005)
@@ -229,12 +234,9 @@ _OWN = {
     'on_error': 'log',
     'warn_after': None,
     'local_delivery': True,
+    'worker': '',
 }
-
-WITNESS_NODE = {
-    **_OWN,
-    'parameters': {'level': 1},
-    'state': {'count': 0, 'heard': [], 'held': [], 'released': False},
+_COUNTING = {
     'publishers': {'counts': {'type': 'std_msgs/msg/Int64', 'qos': 1000}},
     'timers': {
         'count': {
@@ -244,7 +246,19 @@ WITNESS_NODE = {
             'warn_after': None,
         }
     },
+}
+
+WITNESS_NODE = {
+    **_OWN,
+    'parameters': {'level': 1},
+    'state': {'count': 0, 'heard': [], 'heard_afar': [], 'held': [], 'released': False},
+    **_COUNTING,
     'subscriptions': {
+        'counts_afar': {
+            'type': 'std_msgs/msg/Int64',
+            'behaviour': 'witness_parts:hear_afar',
+            'qos': 1000,
+        },
         'counts': {
             'type': 'std_msgs/msg/Int64',
             'behaviour': 'witness_parts:hear',
@@ -263,6 +277,14 @@ WITNESS_NODE = {
     },
     'actions': {'long': {'type': _FIBONACCI, 'behaviour': 'witness_parts:run'}},
 }
+_AFAR = {
+    **_OWN,
+    'worker': 'still',
+    'remap': {'counts': 'counts_afar'},
+    'state': {'count': 0},
+    **_COUNTING,
+}
+WITNESS_NODES = {'witness': WITNESS_NODE, 'witness_afar': _AFAR}
 
 SYSTEM = {
     'version': 1,
@@ -271,16 +293,18 @@ SYSTEM = {
     'check': {'other': {'args': {'speed': 2.0}}},
     'qos': {'near': {'depth': 3}},
     'defaults': {'log_level': 'info'},
+    'workers': {'left': {'restart': {'when': 'never'}}, 'right': {'nice': 1}},
     'include': {
         'wheels_{{ side }}': {
             'file': 'part.yaml',
             'namespace': '/wheels/{{ side }}',
             'foreach': {'side': ['left']},
             'args': {'size': 2},
+            'worker': 'right',
         }
     },
     'nodes': {
-        'witness': WITNESS_NODE,
+        **WITNESS_NODES,
         'talker': {
             'parameters': {
                 'speed': {'default': '{{ speed }}', 'minimum': 0.0, 'maximum': 100.0},
@@ -309,6 +333,7 @@ SYSTEM = {
             'on_parameters': 'parts:decide',
         },
         'listener': {
+            'worker': 'left',
             'publishers': {'echo': {'type': _STRING, 'external': True}},
             'subscriptions': {
                 'hear': {

@@ -13,22 +13,22 @@ from composer.runtime.nodes.behaviour_node import Node
 
 # What a process need not know while it runs.
 _NOT_OF_PROCESSES = ('path', 'wait_for', 'delay_sec', 'description')
+_HOOKS = ('on_start', 'on_stop', 'on_configure', 'on_activate', 'on_deactivate', 'on_cleanup')
+_HOOKS += ('on_error_state',)
+# How rclpy describes it depends on whether it declares all overrides, which may be edited.
+_SAID_BY_RCLPY = ('start_type_description_service',)
 
 
 def describe(system):
-    """Return all that a system is."""
-    spec = system._reading.spec
+    """Return all that a system is, as far as this process runs it."""
+    spec, code = system._reading.spec, system._reading.snapshot.code
     return {
         'nodes': {name: describe_node(system, node) for name, node in system._nodes.items()},
         'processes': {
             name: describe_process(process)
             for name, process in sorted(system._processes.by_name.items())
         },
-        'modules': sorted(
-            name
-            for name in system.snapshot.code
-            if name in sys.modules and system.snapshot.code[name]
-        ),
+        'modules': sorted(name for name in code if name in sys.modules and code[name]),
         'threads': system._executor._spinner.scheduler._max_running,
         'timeouts': (system._handle.stop_timeout_sec, system._processes.timeout_sec),
         'environment': {name: os.environ.get(name) for name in spec.environment},
@@ -41,6 +41,67 @@ def describe(system):
     }
 
 
+def merge(own, others):
+    """Return what a system is of which several processes tell; its own process has no others."""
+    every = [own, *others]
+    return {
+        **own,
+        **{
+            key: sorted({each for part in every for each in part[key]})
+            for key in ('modules', 'closed', 'health')
+        },
+        'nodes': {name: node for part in every for name, node in part['nodes'].items()},
+        'timeouts': sorted({part['timeouts'] for part in every}),
+        'profiles': sorted({part['profiles'] for part in every}),
+        'environment': [
+            *{repr(part['environment']): part['environment'] for part in every}.values()
+        ],
+        'diagnostics': sorted({part['diagnostics'] for part in every}, key=str),
+        'pause_sec': min(part['pause_sec'] for part in every),
+    }
+
+
+def expect_workers(spec, threads):
+    """Return what the workers of a system should be.
+
+    Args:
+        threads: How many callbacks may run in the process of the system.
+    """
+    return {
+        name: {
+            'spec': repr(worker),
+            'nodes': sorted(each.full_name for each in spec.nodes.values() if each.worker == name),
+            'threads': worker.threads or threads,
+            'cpus': {*worker.cpus} or os.sched_getaffinity(0),
+            'nice': os.getpriority(os.PRIO_PROCESS, 0) + (worker.nice or 0),
+            'environment': worker.environment.get('SIDE'),
+            'restart': worker.restart,
+        }
+        for name, worker in spec.workers.items()
+        if any(each.worker == name for each in spec.nodes.values())
+    }
+
+
+def describe_worker(worker, part):
+    """Return what a worker is.
+
+    Args:
+        part: What its own process tells.
+    """
+    pid = worker.process.run.pid
+    environment = Path(f'/proc/{pid}/environ').read_bytes().split(b'\0')
+    sides = [each.decode()[5:] for each in environment if each.startswith(b'SIDE=')]
+    return {
+        'spec': repr(worker.spec),
+        'nodes': sorted(part['nodes']),
+        'threads': part['threads'],
+        'cpus': os.sched_getaffinity(pid),
+        'nice': os.getpriority(os.PRIO_PROCESS, pid),
+        'environment': sides[0] if sides else None,
+        'restart': worker.process.spec.restart,
+    }
+
+
 def describe_node(system, node):
     ros, spec = node.ros, node.spec
     if ros._late_events is not None:
@@ -49,7 +110,7 @@ def describe_node(system, node):
         name: {
             'value': repr(parameter.value),
             'type': parameter.type_.name,
-            'descriptor': str(ros.describe_parameter(name)),
+            'descriptor': None if name in _SAID_BY_RCLPY else str(ros.describe_parameter(name)),
         }
         for name, parameter in ros._parameters.items()
     }
@@ -80,7 +141,7 @@ def describe_node(system, node):
         'limits': {
             str(owner): (limit.after_sec, limit._place())
             for owner, limit in node.limits.items()
-            if owner.kind not in ('on_start', 'on_stop')  # They count from the next start.
+            if owner.kind not in _HOOKS  # They count from the next call.
         },
         'state': sorted(vars(node.behaviour_node.state)),
         'hooks': [
@@ -98,7 +159,7 @@ def describe_entity(node, section, name, entity):
     ros = ros_of(entity)
     described = {'place': node.place(getattr(node.spec, section)[name].path)}
     described['bound'] = describe_bound(entity)
-    described['events'] = describe_bound(getattr(entity, '_events', None))
+    described['events'] = describe_bound(getattr(entity, 'events', None))
     group = getattr(ros, 'callback_group', None)
     described['group'] = (type(group).__name__, group_of(node, group))
     if section in ('publishers', 'subscriptions'):
@@ -191,7 +252,7 @@ def _referred(each):
 
 
 # Nodes; and goals in flight, which end on the code that they began with.
-_NOT_FOLLOWED = ('_node', '_live_node', '_goal_handles', '_result_futures', '_queue', '_events')
+_NOT_FOLLOWED = ('_node', '_live_node', '_goal_handles', '_result_futures', '_queue', 'events')
 _HOLDERS = {
     *('Publisher', 'Subscription', 'Timer', 'Service', 'ServiceClient', 'ActionServer'),
     *('ActionClient', '_Ticker', '_Execution', 'EventBehaviours', 'BehaviourCall'),

@@ -37,6 +37,7 @@ _COMMAND = [['echo', 'two'], ['echo', '{{ half }}'], ['false'], ['eccho', '1'], 
 _TIMEOUT = [9.0, 0, None]
 _FILE = ['others.yaml', 'absent.yaml', 3, None]
 _KEY = ['talker.ros__parameters.name', 'talker.name', '', None]
+_WORKER = ['left', 'right', 'third', '', 'no good', None]
 _BEGIN = ['parts:begin', {'behaviour': 'parts:begin', 'with': {'text': 'b'}}]
 # Whatever its arguments are.
 _SLEEP = ['sh', '-c', 'exec sleep 900']
@@ -88,6 +89,18 @@ VALUES = {
     'defaults.warn_after': _WARN_AFTER,
     'defaults.local_delivery': _BOOL,
     'defaults.qos': _QOS,
+    **dict.fromkeys(('node.worker', 'include.worker', 'defaults.worker'), _WORKER),
+    'system.workers': [{'left': {'threads': 3}, 'third': {}}, {}, {'left': 5}, None],
+    'worker.foreach': _FOREACH,
+    'worker.when': _WHEN,
+    'worker.description': _STRINGS,
+    'worker.cpus': [[0], [1], [0, 1], [1023], [], None],
+    'worker.nice': [1, 3, 20, None],
+    'worker.threads': [1, 4, 0, None],
+    'worker.environment': [{'SIDE': 'a'}, {'SIDE': 'b'}, {'NO GOOD': 'b'}, None],
+    'worker.restart': [{'when': 'always'}, 'always', {}, None],
+    'worker.required': _BOOL,
+    'worker.log_level': ['debug', 'error', 'loud', None],
     'system.max_nodes': [50, 3, 0, None],
     'system.include': [{}, {'one': {'file': 'part.yaml'}}, {'one': 'part.yaml'}, None],
     'include.file': ['part.yaml', 'absent.yaml', None],
@@ -316,24 +329,14 @@ _OF_DECLARED_NODES = (
 )
 _DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
-_OF_WORKERS = (
-    *('description', 'foreach', 'when', 'cpus', 'nice', 'threads', 'environment', 'restart'),
-    *('required', 'host', 'log_level'),
-)
 _OF_HOSTS = (
     *('description', 'foreach', 'when', 'address', 'user', 'port', 'python', 'identity_file'),
     *('folder', 'systemd'),
 )
-_IN_WORKERS = (
-    'tests/runtime/workers/test_workers_are_edited.py edits workers: others cannot see in'
-)
+_WITH_HOST = ('node', 'process', 'container', 'include', 'worker')
 _ELSEWHERE = 'where all runs on one computer, it changes nothing that runs'
 LEFT_OUT: dict[str, str] = {
-    **dict.fromkeys(
-        ('system.workers', 'node.worker', 'include.worker', 'defaults.worker'), _IN_WORKERS
-    ),
-    **{f'worker.{key}': _IN_WORKERS for key in _OF_WORKERS},
-    **{f'{each}.host': _ELSEWHERE for each in ('node', 'process', 'container', 'include')},
+    **{f'{each}.host': _ELSEWHERE for each in _WITH_HOST},
     **dict.fromkeys(('system.hosts', 'system.network', 'defaults.host'), _ELSEWHERE),
     **{f'host.{key}': _ELSEWHERE for key in _OF_HOSTS},
     **{

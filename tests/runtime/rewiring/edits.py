@@ -12,7 +12,7 @@ from tests.runtime.rewiring.base_system import (
     PROGRAM,
     SHARE,
     SYSTEM,
-    WITNESS_NODE,
+    WITNESS_NODES,
 )
 from tests.runtime.rewiring.edit_values import NULL, VALUES
 from tests.runtime.rewiring.schema_keys import ANY, read_schema_keys
@@ -112,13 +112,13 @@ class Project:
             (*found, place[-1])
             for place in self._places[key]
             for found in _find(data, place[:-1], ())
-            if 'witness' not in found
+            if not WITNESS_NODES.keys() & {*found}
         ]
         if not owners:
             return None
         *owner, last = self._random.choice(owners)
         _set(data, owner, last, copy.deepcopy(value))
-        self._documents['system.yaml'].setdefault('nodes', {})['witness'] = WITNESS_NODE
+        self._documents['system.yaml'].setdefault('nodes', {}).update(WITNESS_NODES)
         self.edited.add(key)
         return f'{document}: {".".join(map(str, [*owner, last]))} = {value!r}'
 
@@ -126,7 +126,7 @@ class Project:
         """Make one edit; return what it is."""
         modules = [self._edit_module] * 4
         rest = [self._edit_layer, self._edit_limit, self._add_or_remove, self._rename, self._reset]
-        edits = [*[self._edit_key] * 15, *modules, *rest]
+        edits = [*[self._edit_key] * 15, *modules, *[self._move] * 4, *rest]
         while (done := self._random.choice(edits)()) is None:
             pass
         return done
@@ -161,7 +161,7 @@ class Project:
     def _edit_layer(self):
         layer = self._documents['layer.yaml'] = copy.deepcopy(DOCUMENTS['layer.yaml'])
         nodes = self._documents['system.yaml']['nodes']
-        node = self._random.choice(sorted(nodes.keys() - {'witness'}) or ['nobody'])
+        node = self._random.choice(sorted(nodes.keys() - WITNESS_NODES.keys()) or ['nobody'])
         key = self._random.choice(sorted(each for each in VALUES if each.startswith('node.')))
         value = self._random.choice(VALUES[key])
         layer['nodes'][node] = {key.partition('.')[2]: None if value == NULL else value}
@@ -180,14 +180,14 @@ class Project:
         entries = nodes[node]
         section = self._random.choice(_SECTIONS)
         mine = entries.get(section)
-        if node == 'witness' or (mine is not None and not isinstance(mine, dict)):
+        if node in WITNESS_NODES or (mine is not None and not isinstance(mine, dict)):
             return None
         if mine and self._random.random() < 0.5:
             name = self._random.choice(sorted(mine))
             del mine[name]
             return f'no {node}.{section}.{name}'
         origins = [each for each in SYSTEM['nodes'] if section in SYSTEM['nodes'][each]]
-        origin = self._random.choice(sorted(set(origins) - {'witness'}))
+        origin = self._random.choice(sorted(set(origins) - WITNESS_NODES.keys()))
         name = self._random.choice(sorted(SYSTEM['nodes'][origin][section]))
         entry = copy.deepcopy(SYSTEM['nodes'][origin][section][name])
         entries.setdefault(section, {})[name] = entry
@@ -195,7 +195,7 @@ class Project:
 
     def _rename(self):
         nodes = self._documents['system.yaml']['nodes']
-        node = self._random.choice(sorted(nodes.keys() - {'witness'}) or ['nobody'])
+        node = self._random.choice(sorted(nodes.keys() - WITNESS_NODES.keys()) or ['nobody'])
         name = self._random.choice(['talker', 'listener', 'user', 'fourth', '/full/fifth'])
         if self._random.random() < 0.4:
             nodes.pop(node, None)
@@ -204,6 +204,14 @@ class Project:
         node = node if node in origin else 'talker'
         nodes[name] = copy.deepcopy(origin.get(node, {}))
         return f'node {name} as {node}'
+
+    def _move(self):
+        if self._random.random() < 0.3:
+            keys = sorted(each for each in VALUES if each.startswith('worker'))
+            key = self._random.choice(keys)
+        else:
+            key = self._random.choice(['node.worker'] * 4 + ['include.worker', 'defaults.worker'])
+        return self.set_key(key, self._random.choice(VALUES[key]))
 
     def _reset(self):
         self._documents = copy.deepcopy(DOCUMENTS)

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import traceback
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from tests.running import ROOT
@@ -63,8 +64,11 @@ def _read(reader):
 
 
 @contextmanager
-def running_system(paths, *, checks=True):
+def running_system(paths, workers=None, *, checks=True):
     """Start a system as `composer up` does; yield it with its reloader.
+
+    Args:
+        workers: Run the nodes that are in workers; `None` if all run in this process.
 
     Raises:
         ComposerError: It has errors, or cannot start.
@@ -87,19 +91,38 @@ def running_system(paths, *, checks=True):
     with ExitStack() as stack:
         stack.enter_context(environment_set(context.spec.environment))
         stack.enter_context(project_on_path([paths[0].parent]))
-        reading = import_reading(context, take_snapshot(context))
+        snapshot = take_snapshot(context)
+        if workers is None:
+            snapshot = _with_levels(snapshot)
+            reading = import_reading(context, snapshot)
+        else:
+            stack.callback(workers.kill_all)
+            workers.spawn(snapshot.spec)
+            with workers.importing():
+                reading = import_reading(context, snapshot, workers=workers)
         if reading is None:
             message = 'its behaviours have errors'
             raise ComposerError(message)
         stack.enter_context(log_levels(list(reading.spec.nodes.values()), []))
         guardian = GuardianClient(STOP_SEC, STOP_SEC, owns_process=False)
         stack.callback(guardian.send_away)
-        system = System(reading, guardian)
+        system = System(reading, guardian, workers=workers)
         guardian.wait_until_begun()
         stack.callback(system.stop)
         system.start()
         create_parameter_services(system)
         yield system, Reloader(reader, context, [])
+
+
+def _with_levels(snapshot):
+    """Return a system whose nodes have the levels that their workers give them."""
+    nodes = {
+        key: replace(node, log_level=snapshot.spec.workers[node.worker].log_level)
+        if node.worker and not node.log_level
+        else node
+        for key, node in snapshot.spec.nodes.items()
+    }
+    return replace(snapshot, spec=replace(snapshot.spec, nodes=nodes))
 
 
 def create_parameter_services(system):
@@ -112,7 +135,7 @@ def create_parameter_services(system):
 def _start_and_tell(paths, answers, *, checks):
     from composer.errors import ComposerError
     from composer.runtime import forked_children
-    from tests.runtime.rewiring.descriptions import describe
+    from tests.runtime.rewiring.descriptions import describe, expect_workers, merge
     from tests.runtime.rewiring.observing import see_graph
 
     # It is no child of a behaviour, which must end with it.
@@ -120,7 +143,9 @@ def _start_and_tell(paths, answers, *, checks):
     try:
         with running_system(paths, checks=checks) as (system, _):
             node = next(iter(system._nodes.values())).ros
-            _send(answers, (describe(system), see_graph(node)[0]))
+            told = merge(describe(system), [])
+            told['workers'] = expect_workers(system._reading.spec, told['threads'])
+            _send(answers, (told, see_graph(node)[0]))
     except ComposerError as error:
         _send(answers, str(error))
     except BaseException:  # noqa: BLE001 - the parent waits for an answer

@@ -9,23 +9,17 @@ from time import monotonic, sleep
 from unittest import mock
 
 import pytest
-from rclpy.parameter import Parameter
 
-from composer.errors import StartError
 from composer.planning.differences import compare
 from composer.planning.plan import Action
+from composer.processes import worker_supervisor
 from composer.runtime import system as system_module
-from composer.runtime.rewiring.node_changes import NodeChange
-from composer.runtime.rewiring.rewire import Rewiring
+from composer.runtime.workers.workers import Workers
 from tests.running import DEADLINE_SEC
-from tests.runtime.rewiring.descriptions import describe
+from tests.runtime.rewiring.descriptions import describe_worker, merge
 from tests.runtime.rewiring.edits import Project
-from tests.runtime.rewiring.fresh_start import (
-    FreshStarter,
-    create_parameter_services,
-    running_system,
-)
-from tests.runtime.rewiring.memories import find_lost, remember
+from tests.runtime.rewiring.fresh_start import FreshStarter, running_system
+from tests.runtime.rewiring.inspections import FAULT, Inspection, InspectionElsewhere
 from tests.runtime.rewiring.observing import Observer, see_graph
 from tests.runtime.rewiring.running import check_runs
 from tests.runtime.rewiring.witness import WITNESS, Witness
@@ -35,17 +29,12 @@ _OWN_REASONS = (
     'cannot change while the system runs',
     'its value was set while the system ran',
     ': no',  # What `decide` returns.
+    # A fresh start of the game has no workers.
+    'cannot have cpus',
 )
+_WORKER = Path(__file__).with_name('inspected_worker.py')
 # Topics of every node.
 _OF_NODES = ('/parameter_events', '/rosout')
-# After steps of these a failure strikes.
-_STEPS = (
-    (Rewiring, '_begin'),
-    (Rewiring, '_end_nodes'),
-    (NodeChange, 'change_entity'),
-    (NodeChange, 'change_node'),
-    (NodeChange, 'replace_record'),
-)
 
 
 class Game:
@@ -59,6 +48,7 @@ class Game:
         self._project = project
         self._random = random.Random(seed)
         self._system = system
+        self._own = Inspection(system)
         self._reloader = reloader
         self._fresh = fresh
         self._observer = observer
@@ -75,8 +65,9 @@ class Game:
         done = self._project.edit() if done is None else done
         self._project.write()
         self._set_live(done)
-        self._before = describe(self._system)
-        self._kept = remember(self._system)
+        self._before = self._describe()
+        for each in self._processes():
+            each.remember()
         self._graph, self._gids = see_graph(self._observer.node)
         self._old = self._system.snapshot
         self._plan = None
@@ -84,8 +75,9 @@ class Game:
             outcome = self._reloader.reload(self._system)
         text = outcome.text.splitlines()[-1]
         assert not self._system.stop_requested, done
-        create_parameter_services(self._system)
-        if 'a fault of the game' in text:
+        for each in self._processes():
+            each.create_parameter_services()
+        if FAULT in text:
             self._check_refused(done, text)
             outcome = self._reloader.reload(self._system)
             text = outcome.text.splitlines()[-1]
@@ -108,7 +100,7 @@ class Game:
         try:
             self._forget_live(plan)
             self._check_untouched(plan.operations, done)
-            check_runs(self._system, self._observer, plan, done)
+            check_runs(self._processes(), self._observer, plan, done)
         finally:
             fresh = self._fresh.result()
         if isinstance(fresh, str):
@@ -126,54 +118,49 @@ class Game:
         self._project.keep()
         return done, text
 
+    def _processes(self):
+        """Return what looks into each process, that of the system first."""
+        return [self._own, *map(InspectionElsewhere, self._system.workers._list())]
+
+    def _describe(self):
+        own, *others = self._processes()
+        parts = [each.describe() for each in others]
+        workers = {
+            each.worker.name: describe_worker(each.worker, part)
+            for each, part in zip(others, parts, strict=True)
+        }
+        return {**merge(own.describe(), parts), 'workers': workers}
+
     @contextmanager
     def _failing(self, done):
         """Let one step of the reload fail now and then, after it was done; and see the plan."""
-        left = self._random.choice([0] * 20 + [1, 2, 3, 4, 5])
-
-        def counting(original):
-            def step(*arguments):
-                nonlocal left
-                result = original(*arguments)
-                left -= 1
-                if left == 0:
-                    message = 'a fault of the game'
-                    raise StartError(message)
-                return result
-
-            return step
+        number = self._random.choice([0] * 20 + [1, 2, 3, 4, 5])
+        process = self._random.choice(self._processes())
 
         def seeing(old, new):
-            self._plan = compare(old, new)
-            return self._plan
+            plan = compare(old, new)
+            # That of the whole is made first.
+            self._plan = self._plan or plan
+            return plan
 
-        if left:
-            done.append(f'(fails at step {left})')
-        with ExitStack() as stack:
-            stack.enter_context(mock.patch.object(system_module, 'compare', seeing))
-            for owner, name in _STEPS if left else ():
-                step = counting(getattr(owner, name))
-                stack.enter_context(mock.patch.object(owner, name, step))
+        if number:
+            done.append(f'(fails at step {number})')
+            process.fail_at(number)
+        with mock.patch.object(system_module, 'compare', seeing):
             yield
+        if number and process in self._processes():
+            process.fail_at(0)
 
     def _set_live(self, done):
         """Set a parameter or a value of the state now and then."""
-        nodes = [node for name, node in self._system._nodes.items() if name != WITNESS]
-        if not nodes or self._random.random() < 0.7:
+        if self._random.random() < 0.7:
             return
-        node = self._random.choice(nodes)
-        if vars(node.behaviour_node.state):
-            key = self._random.choice(sorted(vars(node.behaviour_node.state)))
-            setattr(node.behaviour_node.state, key, f'live {self.applied}')
-        names = sorted(node.spec.parameters)
-        name = self._random.choice(names) if names else None
-        value = self._random.choice([0.5, 3.0, 6, 'fast', 'Dora'])
-        if name is None or node.ros._descriptors[name].read_only:
-            return
-        (result,) = node.ros.set_parameters([Parameter(name, value=value)])
-        if result.successful:
-            self._live[node.full_name, name] = repr(value)
-            done.append(f'(set {node.full_name} {name} = {value!r})')
+        process = self._random.choice(self._processes())
+        found = process.set_live(self._random.random(), f'live {self.applied}')
+        if found is not None:
+            *key, value = found
+            self._live[tuple(key)] = value
+            done.append(f'(set {key} = {value})')
 
     def _forget_live(self, plan):
         for operation in plan.operations:
@@ -190,12 +177,12 @@ class Game:
             for each in operations
             if each.target[1] in ('nodes', 'processes') and each.action is Action.RECREATE
         ]
-        _check_same(self._before, describe(self._system), (done, text))
+        _check_same(self._before, self._describe(), (done, text))
         self._check_graph(self._graph, (done, text))
         self._check_untouched(begun_again, (done, text))
 
     def _check_untouched(self, operations, done):
-        lost = find_lost(self._kept, remember(self._system), operations)
+        lost = [lost for each in self._processes() for lost in each.find_lost(operations)]
         assert not lost, f'{done} changed also {lost}'
         touched = {each.target for each in operations if each.action is not Action.CHANGE}
         nodes = {target[0] for target in touched if target[1] == 'nodes'}
@@ -218,7 +205,7 @@ class Game:
     def _check_equal(self, fresh, fresh_graph, done):
         for (full_name, name), value in self._live.items():
             fresh['nodes'][full_name]['parameters'][name]['value'] = value
-        _check_same(fresh, describe(self._system), done)
+        _check_same(fresh, self._describe(), done)
         self._check_graph(fresh_graph, done)
 
     def _check_graph(self, expected, done):
@@ -260,6 +247,7 @@ def playing(folder, seed, domains, checked=0.1):
     project.write()
     environment = {
         'ROS_DOMAIN_ID': str(domains[0]),
+        'PYTHONDONTWRITEBYTECODE': '1',
         'AMENT_PREFIX_PATH': f'{folder / "prefix"}:{os.environ.get("AMENT_PREFIX_PATH", "")}',
     }
     with ExitStack() as stack:
@@ -272,7 +260,8 @@ def playing(folder, seed, domains, checked=0.1):
         stack.callback(os.chdir, before)
         fresh = FreshStarter(project.paths, domains[1])
         stack.callback(fresh.close)
-        system, reloader = stack.enter_context(running_system(project.paths))
+        stack.enter_context(mock.patch.object(worker_supervisor, '_PROGRAM', _WORKER))
+        system, reloader = stack.enter_context(running_system(project.paths, Workers()))
         observer = Observer(domains[0])
         stack.callback(observer.close)
         witness = Witness(system, observer)

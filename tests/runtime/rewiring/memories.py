@@ -9,7 +9,7 @@ from tests.runtime.rewiring.descriptions import find_bound, ros_of
 
 _GONE = (Action.REMOVE, Action.RECREATE)
 # What behaviours change all the time.
-_MOVING = ('count', 'heard', 'held')
+_MOVING = ('count', 'heard', 'heard_afar', 'held')
 # How exactly the time of a tick can be told: the clocks are read one after the other.
 _SOON_NS = 200_000
 _PHASE_NS = 2_000_000

@@ -112,7 +112,9 @@ def see_graph(node):
                     ends.append((end.topic_type, str(end.topic_type_hash), qos))
                     ends.sort()
                     gids[owner, kind, topic].add(bytes(end.endpoint_gid))
-    return seen, gids
+    # Each node has some ends. Of one whose process has ended, rmw may keep the name for ever: what
+    # it said of its nodes last may be taken after it has gone.
+    return {name: ends for name, ends in seen.items() if any(ends.values())}, gids
 
 
 def _is_of_system(node_name):

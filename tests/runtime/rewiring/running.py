@@ -4,7 +4,7 @@ from time import monotonic, sleep
 
 from tests.running import DEADLINE_SEC
 from tests.runtime.rewiring.descriptions import describe_bound, ros_of
-from tests.runtime.rewiring.witness import WITNESS
+from tests.runtime.rewiring.witness import WITNESSES
 
 # Timers with longer periods are not waited for.
 _PROMPT_NS = 200_000_000
@@ -12,31 +12,58 @@ _PROMPT_NS = 200_000_000
 _TYPES = ('std_msgs/msg/String', 'std_srvs/srv/Trigger', 'test_msgs/action/Fibonacci')
 
 
-def check_runs(system, observer, plan, told):
+def check_runs(processes, observer, plan, told):
     """Wait until each behaviour has run that should; actions only if the plan names them."""
     touched = {each.target for each in plan.operations}
-    pending = {}
-    for full_name, node in system._nodes.items():
-        for owner, view in node._views.items():
-            section = f'{owner.kind}s'
-            key = full_name, section, owner.name
-            entity = node.entities[section].get(owner.name)
-            if entity is None or (section == 'actions' and key not in touched):
-                continue
-            if full_name != WITNESS and _should_run(node, section, owner.name, entity):
-                view.own_state.pop('ran', None)
-                pending[key] = node, entity, view
+    pending = [(each, each.begin_runs(touched)) for each in processes]
     deadline = monotonic() + DEADLINE_SEC
-    while pending:
-        for key, (node, entity, view) in list(pending.items()):
-            ran = view.own_state.get('ran')
-            if ran is None:
-                _ask(observer, node, key[1], getattr(node.spec, key[1])[key[2]])
-            else:
-                _check_ran(ran, describe_bound(entity), (told, key))
-                del pending[key]
-        assert monotonic() < deadline, f'{told}: does not run: {list(pending)}'
+    while any(questions for _, questions in pending):
+        for process, questions in pending:
+            for question in questions.values():
+                _ask(observer, *question)
+            for key in process.find_ran(told) if questions else ():
+                del questions[key]
+        left = [[*questions] for _, questions in pending]
+        assert monotonic() < deadline, f'{told}: does not run: {left}'
         sleep(0.002)
+
+
+class Runs:
+    """The behaviours of this process that should run.
+
+    Args:
+        touched: The targets that an edit has named: of actions, only these are run.
+    """
+
+    def __init__(self, system, touched):
+        self._pending = {}
+        for full_name, node in system._nodes.items():
+            for owner, view in node._views.items():
+                section = f'{owner.kind}s'
+                key = full_name, section, owner.name
+                entity = node.entities[section].get(owner.name)
+                if entity is None or (section == 'actions' and key not in touched):
+                    continue
+                if full_name not in WITNESSES and _should_run(node, section, owner.name, entity):
+                    view.own_state.pop('ran', None)
+                    self._pending[key] = node, entity, view
+
+    def questions(self):
+        """Return the section, the name and the type that others have each one run by."""
+        return {
+            key: _question(node, key[1], getattr(node.spec, key[1])[key[2]])
+            for key, (node, _, _) in self._pending.items()
+        }
+
+    def take_ran(self, told):
+        """Return the keys of those that have run, and see that it was what they are bound to."""
+        ran = []
+        for key, (_, entity, view) in list(self._pending.items()):
+            if (noted := view.own_state.get('ran')) is not None:
+                _check_ran(noted, describe_bound(entity), (told, key))
+                ran.append(key)
+                del self._pending[key]
+        return ran
 
 
 def _should_run(node, section, name, entity):
@@ -50,15 +77,23 @@ def _should_run(node, section, name, entity):
     return timer.timer_period_ns < _PROMPT_NS and not is_simulated and not timer.is_canceled()
 
 
-def _ask(observer, node, section, spec):
+def _question(node, section, spec):
+    resolve = {
+        'subscriptions': lambda: node.ros.resolve_topic_name(spec.topic),
+        'services': lambda: node.ros.resolve_service_name(spec.service),
+        'actions': lambda: node.ros.resolve_action_name(spec.action),
+    }.get(section, str)
+    return section, resolve(), getattr(spec, 'type', None)
+
+
+def _ask(observer, section, name, type_name):
     """Let a behaviour have what it waits for."""
     if section == 'subscriptions':
-        observer.publish(node.ros.resolve_topic_name(spec.topic), spec.type)
+        observer.publish(name, type_name)
     elif section == 'services':
-        observer.wait(observer.begin_call(node.ros.resolve_service_name(spec.service), spec.type))
+        observer.wait(observer.begin_call(name, type_name))
     elif section == 'actions':
-        name = node.ros.resolve_action_name(spec.action)
-        observer.wait(observer.send_goal(name, spec.type, order=1))
+        observer.wait(observer.send_goal(name, type_name, order=1))
 
 
 def _check_ran(ran, bound, told):

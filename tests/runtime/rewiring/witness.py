@@ -5,6 +5,8 @@ from rclpy.parameter import Parameter
 from tests.running import wait_for
 
 WITNESS = '/witness'
+# The second one tells it numbers from a worker.
+WITNESSES = (WITNESS, '/witness_afar')
 
 
 class Witness:
@@ -32,7 +34,8 @@ class Witness:
         wait_for(lambda: state.held[-5:] == list(range(5)), 'all messages that were held')
         assert self._observer.wait(self._response).message == 'released'
         assert list(self._observer.wait(self._result).result.sequence) == [42]
-        heard = list(state.heard)
-        assert heard == list(range(heard[0], heard[0] + len(heard)))
+        wait_for(lambda: state.heard_afar, 'messages of a worker')
+        for heard in (list(state.heard), list(state.heard_afar)):
+            assert heard == list(range(heard[0], heard[0] + len(heard)))
         assert self._node.behaviour_node.parameters.level == 7
         assert self._node.ros is self._ros
