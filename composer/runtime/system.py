@@ -13,7 +13,6 @@ from composer.runtime.hold import wait_until_let_go
 from composer.runtime.local_part import LocalPart
 from composer.runtime.logs import system_logger
 from composer.runtime.rewiring.goals_in_flight import wait_for_goals
-from composer.runtime.workers.worker_parts import find_moved
 from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
@@ -136,14 +135,16 @@ class System(LocalPart):
             ComposerError: That failed, and the system is as it was.
         """
         plan = compare(self.snapshot, new.snapshot)
-        moved = find_moved(self._whole.spec, new.spec) if self.workers.are_used else ()
+        # There may be none, and each edit begins with this.
+        ending = list(self.workers.find_ending(self._whole.spec, new.spec)) or [[]]
         edits = [self.begin_edit(self.workers.own_part(new)), *self.workers.begin_edits(new)]
         with self.workers.editing(new, aborts_goals, is_outdated):
             try:
                 for each in edits:
                     each.wait_for_goals(aborts_goals, is_outdated)
-                for each in edits:
-                    each.make_way(moved)
+                for names in ending:
+                    for each in edits:
+                        each.make_way(names)
                 for each in edits:
                     each.apply(is_outdated)
             except BaseException:

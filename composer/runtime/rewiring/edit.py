@@ -45,14 +45,17 @@ class Edit:
     def make_way(self, names: Collection[str]) -> None:
         """End those of these nodes that are here: they begin again in another process.
 
+        It may be called several times.
+
         Args:
             names: Their full names.
 
         Raises:
             ComposerError: One of them hangs, or the system stops.
         """
-        self._lock.acquire()
-        self._has_lock = True
+        if not self._has_lock:
+            self._lock.acquire()
+            self._has_lock = True
         if self._stop.is_set:
             message = 'the system stops'
             raise ComposerError(message)

@@ -7,6 +7,7 @@ of one device, cannot be.
 
 from __future__ import annotations
 
+from itertools import chain
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from composer.runtime.nodes.system_handle import never
 from composer.runtime.rewiring.clashes import find_clashing_ends
 from composer.runtime.rewiring.goals_in_flight import find_going_actions, wait_for_goals
 from composer.runtime.rewiring.node_changes import NodeChange, set_sim_times
+from composer.runtime.rewiring.order_of_ends import order_ends
 from composer.runtime.rewiring.transaction import Transaction
 
 if TYPE_CHECKING:
@@ -226,7 +228,8 @@ class Rewiring:
 
     def _end_nodes(self, names: Iterable[str]) -> None:
         """End nodes that are recreated; to undo that, they begin again with their state."""
-        for full_name in names:
+        specs = [self._nodes[name].spec for name in names]
+        for full_name in chain.from_iterable(order_ends(specs)):
             node = self._nodes[full_name]
             if node.lifecycle is not None:
                 self._states[full_name] = node.lifecycle.state

@@ -132,8 +132,7 @@ class ReplacedWorker:
     def make_way(self, names: Collection[str]) -> None:
         """See `WorkerEdit`."""
         if self._old is not None:
-            # A name is that of one node: all of them end for those of the new process.
-            self._old.call('make_way', names if self._new is None else self._old.nodes)
+            self._old.call('make_way', names)
 
     def apply(self, _is_outdated: Callable[[], bool]) -> None:
         """See `WorkerEdit`."""

@@ -18,13 +18,19 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.bindings import system_bindings
 from composer.network.transport_profile import shared_memory_variables
+from composer.runtime.rewiring.order_of_ends import order_ends
 from composer.runtime.workers.assignment import Assignment, ImportRequest
 from composer.runtime.workers.at_once import ANSWER_SEC, ask_all, do_at_once
 from composer.runtime.workers.system_calls import SystemCalls
 from composer.runtime.workers.worker import Worker
 from composer.runtime.workers.worker_edits import ChangedWorker, ReplacedWorker
 from composer.runtime.workers.worker_keeper import KILL_SEC, WorkerKeeper
-from composer.runtime.workers.worker_parts import needs_new_process, part_of, used_workers
+from composer.runtime.workers.worker_parts import (
+    find_moved,
+    needs_new_process,
+    part_of,
+    used_workers,
+)
 from composer.runtime.workers.worker_watch import WorkerWatch
 
 if TYPE_CHECKING:
@@ -284,6 +290,19 @@ class Workers:
                 adopt = partial(self._adopt, name)
                 edits.append(ReplacedWorker(old, coming, adopt, timeout_sec))
         return edits
+
+    def find_ending(self, old: SystemSpec, new: SystemSpec) -> Iterator[list[str]]:
+        """Yield the nodes that end in their process before others begin, as `order_ends` does."""
+        if not self.are_used:
+            return
+        moved = set(find_moved(old, new))
+        # A name is that of one node: all of them end for those of the new process.
+        replaced = self._workers.keys() & self._coming.keys()
+        yield from order_ends(
+            each
+            for each in old.nodes.values()
+            if each.full_name in moved or each.worker in replaced
+        )
 
     @contextmanager
     def editing(

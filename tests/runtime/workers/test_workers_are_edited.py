@@ -71,6 +71,38 @@ def test_nodes_move_between_workers_and_the_rest_stays(compose):
     assert child.stop() == 0
 
 
+def test_who_calls_a_server_moves_with_it(compose):
+    # Longer than a node may take to end: who waits for what has ended already hangs.
+    code = (
+        CODE
+        + """
+    def call(node):
+        node.call('empty', timeout=100)
+        print(f'{node.name} is answered', flush=True)
+    """
+    )
+    serves = 'services: {empty: {type: std_srvs/srv/Empty, behaviour: parts:serve}}'
+    calls = (
+        'service_clients: {empty: std_srvs/srv/Empty}',
+        'timers: {call: {period: 0.01, behaviour: parts:call}}',
+    )
+
+    def text(server, client, more=''):
+        nodes = {'server': node(server, serves), 'client': node(client, *calls)}
+        return system(nodes, f'executor: {{shutdown_timeout: 8}}\n{more}')
+
+    child = compose(text('', ''), code, '--watch')
+    environment = 'workers: {both: {environment: {SENSOR: front}}}\n'
+    edits = [('left', 'right'), ('both', 'both'), ('both', 'both', environment)]
+    for times, each in enumerate([None, *edits], start=1):
+        if each is not None:
+            edit(compose, child, text(*each), code)
+        pid_of(child, 'client', times=times)
+        done = len(child.matching('is answered'))
+        child.wait_for_line('is answered', times=done + 2)
+    assert child.stop() == 0
+
+
 def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose):
     nodes = {'talker': node('left', *TALKS), 'far': node('right', *HEARS)}
     child = compose(system(nodes), CODE, '--watch')
