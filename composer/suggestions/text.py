@@ -74,7 +74,9 @@ def _table(suggestion: Suggestion) -> list[str]:
     if guessed:
         lines.append(f'  the GIL of these is not known, and taken to be their CPU: {guessed}')
     if suggestion.after.crossing > 0:
-        lines.append(f'  messages between them: {suggestion.after.crossing:.0%} of a core')
+        # What crosses already is in the figures of the nodes.
+        more = ' more' if any(load.present.values()) else ''
+        lines.append(f'  messages between them: {suggestion.after.crossing:.0%} of a core{more}')
     return lines
 
 

@@ -11,6 +11,7 @@ from composer.suggestions.loads import Flow, NodeLoad, SystemLoad
 from composer.suggestions.model import cost_of, gain_of, send_sec, take_sec
 from composer.suggestions.search import find_split
 from composer.suggestions.suggestion import LEAST_GAIN, suggest_split
+from composer.suggestions.text import render_text
 
 MEGABYTE = 1e6
 
@@ -177,6 +178,14 @@ def test_what_crosses_is_sent_once_and_taken_by_each():
     assert cost.crossing == pytest.approx(10 * (send_sec(MEGABYTE) + 2 * take_sec(MEGABYTE)))
     assert cost.by_worker['p'] == pytest.approx(0.2 + 20 * take_sec(MEGABYTE))
     assert gain_of(load, load.present) == 1.0
+
+
+@pytest.mark.parametrize(('worker', 'more'), [('', ''), ('old', ' more')])
+def test_it_is_said_whether_messages_cross_already(worker, more):
+    nodes = [NodeLoad('/a', 0.5, 0.5), NodeLoad('/b', 0.45, 0.45), NodeLoad('/c', 0, 0, worker)]
+    flows = [Flow('/x', '/a', '/b', 10.0, MEGABYTE)]
+    text = render_text(suggest_split(SystemLoad(nodes, flows, cores=4)), 'it', '', '')
+    assert f'  messages between them: 4% of a core{more}\n' in text
 
 
 def test_what_crossed_already_is_won_when_it_does_no_more():

@@ -14,7 +14,7 @@ from composer.checks.checker import create_context
 from composer.cli.common.file_selection import load_given
 from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
 from composer.suggestions.figures import Measured, average_answers, read_recorded
@@ -61,13 +61,16 @@ def suggest(
     """Print a split and what it gains; return the exit code.
 
     Raises:
-        UsageError: The arguments or `--set` do not fit the file.
+        UsageError: The arguments or `--set` do not fit the file, or the layer file exists.
         ComposerError: There are no figures, or the layer file cannot be written.
     """
 
     def load(*layers: Path) -> LoadedSystem:
         return load_given([*paths, *layers], words, set_values)
 
+    if options.output is not None and options.output.is_file():
+        message = f"'{options.output}' exists, and is not overwritten"
+        raise UsageError(message)
     system = load()
     show_findings([each for each in system.diagnostics if has_errors([each])])
     if has_errors(system.diagnostics) or system.spec is None:

@@ -305,8 +305,11 @@ def limit_processor(spec: WorkerSpec) -> None:
                     os.sched_setaffinity(thread, spec.cpus or _cpus_before)
                 os.setpriority(os.PRIO_PROCESS, thread, _nice_before + (spec.nice or 0))
     except OSError as error:
-        what = f'cpus {list(spec.cpus)}' if error.errno == errno.EINVAL else f'nice {spec.nice}'
-        message = f"worker '{spec.name}' cannot have {what}: {error.strerror}"
+        if error.errno == errno.EINVAL:
+            message = f"worker '{spec.name}' cannot have cpus {list(spec.cpus)}"
+            advice = f'the cores that there are for it: {sorted(_cpus_before)}'
+            raise StartError(message, help=advice) from error
+        message = f"worker '{spec.name}' cannot have nice {spec.nice}: {error.strerror}"
         raise StartError(message) from error
 
 

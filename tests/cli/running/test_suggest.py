@@ -237,6 +237,14 @@ def test_recordings_that_say_nothing_are_errors(system, capsys, tmp_path, name):
     assert capsys.readouterr() == ('', expected.format(path=path))
 
 
+def test_a_file_that_exists_is_not_overwritten(system, capsys, tmp_path):
+    recording = record(tmp_path, *BUSY)
+    before = system.read_text()
+    assert run(['suggest', str(system), '--recording', str(recording), '-o', str(system)]) == 2
+    assert capsys.readouterr()[1].startswith(f"error: '{system}' exists, and is not overwritten")
+    assert system.read_text() == before
+
+
 def test_a_file_with_errors_is_reported(system, capsys, tmp_path):
     recording = record(tmp_path, *BUSY)
     system.write_text(PIPELINE.replace('timers:', 'tmers:'))

@@ -59,6 +59,7 @@ def test_no_on_start_runs_before_all_nodes_of_all_workers_exist(compose):
     assert child.wait() == 1
     assert 'begins' not in child.output
     assert child.matching("error: worker 'right' cannot have cpus [1023]")
+    assert child.matching('help: the cores that there are for it: [0')
 
 
 @pytest.mark.parametrize(
