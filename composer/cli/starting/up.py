@@ -88,8 +88,9 @@ def up(  # noqa: PLR0913 - one for each option
             input is to be watched.
     """
     if ends_process and isinstance(sys.stdout, io.TextIOWrapper):
-        # What behaviours print is shown at once, in a file, too.
-        sys.stdout.reconfigure(line_buffering=True)
+        # What behaviours print is shown at once, in a file, too; and in whole lines, also if
+        # Python was told not to buffer: workers write there as well.
+        sys.stdout.reconfigure(line_buffering=True, write_through=False)
     _refuse_scenario(paths[0])
     if watches and str(paths[0]) == '-':
         message = '--watch cannot watch standard input, which is read once'
