@@ -85,29 +85,16 @@ def composer_command(system: str, host: HostSpec, *words: str) -> str:
 
 def state_command(system: str, host: HostSpec) -> str:
     """Return the command line that prints whether the unit of a part is active."""
-    return f'{_systemctl(host)} is-active -- {shlex.quote(unit_of(system, host))}'
+    return f'{systemctl(host)} is-active -- {shlex.quote(unit_of(system, host))}'
 
 
 def stop_command(system: str, host: HostSpec) -> str:
     """Return the command line that stops a part, and waits until it has stopped."""
-    return f'{_systemctl(host)} stop -- {shlex.quote(unit_of(system, host))}'
+    return f'{systemctl(host)} stop -- {shlex.quote(unit_of(system, host))}'
 
 
-def log_command(system: str, host: HostSpec, *, follows: bool) -> str:
-    """Return the command line that prints what a part has said since its last start.
-
-    Args:
-        follows: Whether it goes on.
-    """
-    unit = shlex.quote(unit_of(system, host))
-    word = '--user-unit' if host.systemd == 'user' else '--unit'
-    journal = f'journalctl --quiet --no-pager --output=cat {word}={unit}'
-    begin = f'$({_systemctl(host)} show -P ExecMainStartTimestamp -- {unit})'
-    follow = ' --follow' if follows else ''
-    return f'begun={begin}; {journal} ${{begun:+"--since=$begun"}} --lines=all{follow}'
-
-
-def _systemctl(host: HostSpec) -> str:
+def systemctl(host: HostSpec) -> str:
+    """Return the command of systemd that knows the unit of a part."""
     return 'systemctl --user' if host.systemd == 'user' else 'systemctl'
 
 

@@ -86,23 +86,57 @@ def test_top_draws_all_hosts_on_a_screen_until_one_is_lost(project, terminal):
     )
 
 
-def test_logs_have_the_host_at_each_line_and_follow_all(project):
+def test_logs_have_the_host_at_each_line(project):
     done = project.run('logs')
     assert done.returncode == 0, done.stderr
     assert any(
         line.startswith('front | ') and 'talks' in line for line in done.stdout.splitlines()
     )
+
+
+def test_logs_that_follow_have_each_line_once_also_of_a_host_that_was_lost(project, tmp_path):
+    unit = 'composer-robot@rear.service'
+    shown = project.rear.run('systemctl', '--user', 'show', '-P', 'ExecMainStartTimestamp', unit)
+    journal = ['journalctl', f'--user-unit={unit}', f'--since={shown.stdout.strip()}', '-o', 'cat']
+    out, told = tmp_path / 'out', tmp_path / 'told'
     words = project.bed.command(*project.words('logs', '-f'))
+    with (
+        out.open('w') as output,
+        told.open('w') as errors,
+        subprocess.Popen(words, stdout=output, stderr=errors, **project.options) as process,
+    ):
+
+        def has_all():
+            lines = [line.partition(' | ') for line in out.read_text().splitlines()]
+            assert {host.strip() for host, *_ in lines} <= {'front', 'rear'}
+            rear = [text for host, _, text in lines if host.strip() == 'rear']
+            return rear and rear == project.rear.run(*journal).stdout.splitlines()
+
+        wait_for(has_all, 'what rear has said')
+        project.rear.run('systemctl', 'stop', 'ssh', user='root')
+        project.rear.run('pkill', '-KILL', '-x', 'sshd', user='root')
+        wait_for(lambda: 'host rear' in told.read_text(), 'the loss')
+        project.rear.run('systemctl', '--user', 'restart', unit)
+        project.rear.run('systemctl', 'start', 'ssh', user='root')
+        wait_for(lambda: 'host rear is there again\n' in told.read_text(), 'rear')
+        wait_for(has_all, 'what rear has said meanwhile')
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 130
+    lost, again = told.read_text().splitlines()
+    assert lost.startswith('error: host rear (rear) was lost')
+    assert again == 'host rear is there again'
+
+
+def test_logs_that_follow_fail_if_a_host_was_never_there(project):
+    words = project.words('logs', '-f', '--set=hosts.rear.port=23')
     pipe = subprocess.PIPE
     with subprocess.Popen(
-        words, stdout=pipe, stderr=pipe, text=True, **project.options
+        project.bed.command(*words), stdout=pipe, stderr=pipe, text=True, **project.options
     ) as process:
-        hosts = set()
-        while len(hosts) < 2:
-            hosts.add(process.stdout.readline().partition(' ')[0])
+        assert process.stderr.readline().startswith('error: host rear (rear) cannot be reached')
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=30)
-    assert hosts == {'front', 'rear'}
+    assert process.returncode == 1
 
 
 def test_what_is_down_stays_down_until_it_is_deployed(project):

@@ -25,13 +25,12 @@ from composer.hosts.asking import (
     Reply,
     ask_all,
     ask_composer,
-    follow_all,
-    log_command,
     state_command,
     stop_command,
 )
 from composer.hosts.bundle import choose_hosts
 from composer.hosts.connection import import_asyncssh
+from composer.hosts.journal import JournalReader
 from composer.terminal import escape
 
 if TYPE_CHECKING:
@@ -162,16 +161,28 @@ def logs_across(asked: AskedSystem, *, follows: bool) -> int:
     system, hosts = _read(asked)
     width = max(len(host.name) for host in hosts)
 
-    def take(host: HostSpec, text: str) -> None:
-        click.echo(f'{escape(host.name):{width}} | {escape(text)}')
+    def create_reader(host: HostSpec) -> JournalReader:
+        def take(text: str) -> None:
+            click.echo(f'{escape(host.name):{width}} | {escape(text)}')
 
-    problems: list[str] = []
-    with suppress(KeyboardInterrupt), signals.interrupting():
-        follow = follow_all(hosts, lambda host: log_command(system, host, follows=follows), take)
-        problems = asyncio.run(follow)
-    for each in problems:
-        click.echo(f'error: {escape(each)}', err=True)
-    return ExitCode.FAILED if problems else ExitCode.DONE
+        return JournalReader(system, host, take, _tell)
+
+    readers = [create_reader(host) for host in hosts]
+
+    async def read_all() -> None:
+        await asyncio.gather(*(each.follow() if follows else each.read() for each in readers))
+
+    with signals.interrupting():
+        try:
+            asyncio.run(read_all())
+        except KeyboardInterrupt:
+            if not any(each.has_failed for each in readers):
+                raise
+    return ExitCode.FAILED if any(each.has_failed for each in readers) else ExitCode.DONE
+
+
+def _tell(line: str) -> None:
+    click.echo(escape(line), err=True)
 
 
 def _read(asked: AskedSystem) -> tuple[str, list[HostSpec]]:
