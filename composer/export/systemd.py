@@ -15,7 +15,7 @@ from composer.errors import ComposerError
 from composer.processes.own_process import own_command
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from composer.export.parts import Export, HostPart, Scope
 
@@ -42,7 +42,7 @@ def render_files(export: Export) -> dict[str, str]:
 
 def _render(export: Export, part: HostPart) -> str:
     must_be_there = any(export.read.values())
-    file = f'%E/composer/{_NO_FILE_NAME.sub("_", part.system)}.env'
+    file = environment_file_of(part.system)
     return render_unit(
         [*own_command(), *export.arguments(part)],
         description=f'{export.description} ({part.name})',
@@ -58,6 +58,11 @@ def _render(export: Export, part: HostPart) -> str:
     )
 
 
+def environment_file_of(system: str) -> str:
+    """Return the file with variables that the unit of a system reads."""
+    return f'%E/composer/{_NO_FILE_NAME.sub("_", system)}.env'
+
+
 def _explain(export: Export, part: HostPart) -> Iterator[str]:
     name = unit_name(part.system, part.host)
     is_user = part.scope == 'user'
@@ -69,9 +74,14 @@ def _explain(export: Export, part: HostPart) -> Iterator[str]:
     if part.host:
         yield f'For {part.host}, where the files and Composer lie in the folders of this computer.'
     if export.read:
-        folder = '~/.config/composer' if is_user else '/etc/composer'
-        names = ', '.join(export.read)
-        yield f'EnvironmentFile: in {folder}, with a line NAME="value" for each of: {names}'
+        yield explain_environment_file(part.scope, export.read)
+
+
+def explain_environment_file(scope: Scope, names: Iterable[str]) -> str:
+    """Return a comment of a unit that says where variables are given, by their names."""
+    folder = '~/.config/composer' if scope == 'user' else '/etc/composer'
+    listed = ', '.join(names)
+    return f'EnvironmentFile: in {folder}, with a line NAME="value" for each of: {listed}'
 
 
 def unit_name(system: str, host: str = '') -> str:

@@ -40,6 +40,7 @@ class Bundle:
         given: The file and its layers.
         named: All files that were read.
         words: The arguments of the command line that come after the files.
+        read: The variables of the environment that the files read, and whether they are set here.
     """
 
     def __init__(
@@ -48,8 +49,9 @@ class Bundle:
         given: Sequence[Path],
         named: Iterable[Path],
         words: Sequence[str],
+        read: Mapping[str, bool],
     ) -> None:
-        self._context = context
+        self._context, self._read = context, read
         # Modules come in wheels.
         modules = set(context.modules.list_files())
         others = [path for path in named if path not in modules]
@@ -57,6 +59,11 @@ class Bundle:
         paths = [os.path.relpath(path, self._files.folder) for path in given]
         self._words = [*paths, *words]
         self._composer = build_composer_wheel()
+
+    @property
+    def needed_variables(self) -> list[str]:
+        """The variables that must be set on each host: those that are set here."""
+        return [name for name, is_set in self._read.items() if is_set]
 
     def build(self, hosts: Iterable[HostSpec], facts: Mapping[str, Any]) -> dict[str, Part]:
         """Return what each host is brought, by its name.
@@ -89,6 +96,7 @@ class Bundle:
             variables=ros_variables(spec),
             start=encode_snapshot(keep_start(snapshot)),
             hosts=choose_hosts(self._context.spec),
+            read=self._read,
         )
         return build_part(sources, facts)
 

@@ -9,6 +9,7 @@ import socket
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from composer.errors import ComposerError
+from composer.export.systemd import environment_file_of
 from composer.hosts.agent_client import HostAgent
 from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host, plan_removal
@@ -77,6 +78,7 @@ class Deployment:
                 'system': self._system,
                 'unit': unit_of(self._system, host),
                 'scope': host.systemd,
+                'environment_file': environment_file_of(self._system),
             }
         )
 
@@ -113,6 +115,26 @@ class Deployment:
         if problems:
             raise DeployError('\n'.join(problems))
         return self._facts
+
+    def check_variables(self, needed: Iterable[str]) -> None:
+        """Check that what the files read from the environment is set on all hosts.
+
+        Args:
+            needed: The names of the variables.
+
+        Raises:
+            DeployError: Some of them are not.
+        """
+        problems, files = [], []
+        for name, facts in self._facts.items():
+            missing = [each for each in needed if each not in facts['variables']]
+            if missing:
+                problems.append(f'host {name}: not set there: {", ".join(missing)}')
+                files.append(facts['environment_file'])
+        if problems:
+            listed = ' or '.join(dict.fromkeys(files))
+            advice = f'the files read them by env(…): there, write NAME="value" into {listed}'
+            raise DeployError('\n'.join(problems), help=advice)
 
     async def lock(self) -> None:
         """Keep other deployments away, and take back what one has left that was cut off.

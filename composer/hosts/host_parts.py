@@ -7,13 +7,18 @@ import os
 import shlex
 from typing import TYPE_CHECKING, Any
 
-from composer.export.systemd import render_unit, unit_name
+from composer.export.systemd import (
+    environment_file_of,
+    explain_environment_file,
+    render_unit,
+    unit_name,
+)
 from composer.hosts.wheels import Wheel
 from composer.language.specs import HostSpec
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
     from composer.hosts.project_files import ProjectFiles
@@ -90,6 +95,7 @@ class PartSources:
         variables: What the environment says of ROS.
         start: What a system that runs starts again for, as `encode_snapshot` writes it.
         hosts: All that have a part of the system.
+        read: Other variables of the environment, which the files read.
     """
 
     spec: SystemSpec
@@ -102,6 +108,7 @@ class PartSources:
     variables: Mapping[str, str]
     start: Mapping[str, Any]
     hosts: Sequence[HostSpec]
+    read: Collection[str] = ()
 
 
 def unit_of(system: str, host: HostSpec) -> str:
@@ -221,6 +228,8 @@ def _render_run(
 def _render_unit(sources: PartSources, facts: Mapping[str, Any]) -> str:
     spec, host = sources.spec, sources.host
     root = facts['root']
+    # With other names it is another unit: the system must start again to have them.
+    explained = [explain_environment_file(host.systemd, sorted(sources.read))]
     return render_unit(
         ['/bin/sh', f'{root}/start', facts['hold']],
         description=f'{spec.name} on {host.name}',
@@ -229,7 +238,8 @@ def _render_unit(sources: PartSources, facts: Mapping[str, Any]) -> str:
         scope=host.systemd,
         reload=[f'{root}/live/composer', 'reload', f'{spec.name}@{host.name}'],
         lowest_nice=min((each.nice or 0 for each in spec.workers.values()), default=0),
-        comments=[UNIT_COMMENT],
+        environment_file=f'-{environment_file_of(spec.name)}' if sources.read else '',
+        comments=[UNIT_COMMENT, *(explained if sources.read else [])],
     )
 
 

@@ -135,3 +135,29 @@ def test_what_is_removed_leaves_nothing_but_what_others_wrote(project):
     assert project.front.run('ls', FOLDER).returncode
     for host in (project.front, project.rear):
         assert not host.run('find', UNITS, '-name', '*composer*').stdout
+
+
+def test_variables_that_the_files_read_are_those_of_each_host(project, monkeypatch):
+    monkeypatch.setenv('DUO_TEXT', 'hello of the laptop')
+    monkeypatch.delenv('DUO_OTHER', raising=False)
+    texts = "environment: {TEXT: \"{{ env('DUO_TEXT') ~ env('DUO_OTHER', '') }}\"}\n"
+    project.edit('robot.yaml', 'version: 1\n', f'version: 1\n{texts}')
+    project.edit('behaviours/talk.py', "'hello'", "__import__('os').environ['TEXT']")
+    before = project.states()
+    file = '.config/composer/robot.env'
+    told = project.fail()
+    assert told == (
+        'error: host front: not set there: DUO_TEXT\n'
+        '  host rear: not set there: DUO_TEXT\n'
+        '  help: the files read them by env(…): there, write NAME="value" into '
+        f'/home/robot/{file}\n'
+    )
+    assert project.states() == before
+    given = '# of this host\\nDUO_TEXT="hello of\\\\\\n the host"\\nDUO_OTHER=!\\n'
+    for host in (project.front, project.rear):
+        host.run('sh', '-c', f"mkdir -p .config/composer; printf '{given}' >{file}")
+    lines = project.deploy().stdout.splitlines()
+    assert 'front: restart (its unit changes)' in lines
+    project.hears('hello of the host!')
+    for host in (project.front, project.rear):
+        host.run('rm', '-r', '.config/composer')

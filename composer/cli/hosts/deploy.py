@@ -17,6 +17,8 @@ from composer.cli.common.output import show_findings
 from composer.cli.common.system_reader import list_files
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
+from composer.export.parts import choose_read
+from composer.expressions.functions import variables_noted
 from composer.hosts.bundle import Bundle, choose_hosts
 from composer.hosts.connection import find_real_address, import_asyncssh
 from composer.hosts.deployment import Deployment
@@ -59,14 +61,16 @@ def deploy(
         ComposerError: It could not be done, and everything is as it was.
     """
     import_asyncssh()
-    context = _read(paths, words, set_values, needs_hosts=not removes)
+    with variables_noted() as names:
+        context = _read(paths, words, set_values, needs_hosts=not removes)
     if context is None:
         return ExitCode.FAILED
     chosen = choose_hosts(context.spec, hosts)
     if removes:
         return _run(_remove(context.spec, chosen, hosts, leave))
     settings = [f'--set={each}' for each in (*set_values, *find_addresses(context.spec))]
-    bundle = Bundle(context, paths, list_files(context), [*words, *settings])
+    read = choose_read(names)
+    bundle = Bundle(context, paths, list_files(context), [*words, *settings], read)
     return _run(_deploy(context.spec, chosen, hosts, leave, bundle, only_plans=only_plans))
 
 
@@ -144,6 +148,7 @@ async def _deploy(
         if not only_plans:
             await deployment.lock()
         facts = await deployment.look()
+        deployment.check_variables(bundle.needed_variables)
         if not only_plans:
             await deployment.repair()
         await deployment.find_left(spec.hosts, wanted, leave, locks=not only_plans)

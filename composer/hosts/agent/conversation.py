@@ -35,13 +35,14 @@ def main(options: Mapping[str, Any]) -> None:
     """Answer until the connection ends.
 
     Args:
-        options: `folder`, `system`, `unit` and `scope`: of the system that it is about.
+        options: `folder`, `system`, `unit`, `scope` and `environment_file`: of the system that it
+            is about.
     """
     # The end of the connection is seen by its end alone: then there is work to do.
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGPIPE):
         signal.signal(number, signal.SIG_IGN)
     store = Store(options['folder'], options['system'])
-    service = Service(options['unit'], options['scope'])
+    service = Service(options['unit'], options['scope'], options['environment_file'])
     Conversation(store, service, Transaction(store, service)).run()
 
 
@@ -133,7 +134,8 @@ class Conversation:
 
     def _run_release(self, release: str, words: list[str]) -> str:
         """Run Composer as a release has it."""
-        return run([str(self._store.root / release / 'composer'), *words])
+        program = str(self._store.root / release / 'composer')
+        return run([program, *words], variables=self._service.variables())
 
 
 class _Input:

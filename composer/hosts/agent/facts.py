@@ -56,9 +56,17 @@ def _has_venv() -> bool:
 
 
 def _unit_facts(service: Service) -> dict[str, Any]:
+    environment = {'environment_file': str(service.environment_file), 'variables': []}
     if service.why_unusable():
-        return {'unit': None, 'unit_path': str(service.path), 'unit_digest': None, 'state': {}}
+        return environment | {
+            'unit': None,
+            'unit_path': str(service.path),
+            'unit_digest': None,
+            'state': {},
+        }
     return {
+        **environment,
+        'variables': sorted(service.variables()),
         'unit': service.read(),
         'unit_path': str(service.path),
         'unit_digest': digest_file(service.path),

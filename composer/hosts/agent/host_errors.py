@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import errno
+import os
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 _MOST_LINES = 30
 
@@ -36,8 +37,17 @@ def explain(error: Exception) -> tuple[str, str]:
     return f'{type(error).__name__}: {error}', ''
 
 
-def run(command: Sequence[str], *, cwd: Path | None = None, timeout_sec: float = 900.0) -> str:
+def run(
+    command: Sequence[str],
+    *,
+    cwd: Path | None = None,
+    timeout_sec: float = 900.0,
+    variables: Mapping[str, str] | None = None,
+) -> str:
     """Run a program; return what it has printed.
+
+    Args:
+        variables: What its environment has besides that of this process.
 
     Raises:
         HostError: It failed; the help is the end of what it has printed.
@@ -46,6 +56,7 @@ def run(command: Sequence[str], *, cwd: Path | None = None, timeout_sec: float =
         done = subprocess.run(  # noqa: S603 - what the deployment says
             command,
             cwd=cwd,
+            env={**os.environ, **(variables or {})},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

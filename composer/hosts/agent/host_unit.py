@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pwd
+import shlex
 import threading
 import time
 from pathlib import Path
@@ -21,13 +22,15 @@ class Service:
     Args:
         name: The name of the unit.
         scope: `user` or `system`.
+        environment_file: The file with variables that it reads; may have `%E`.
 
     Attributes:
         abandoned: Set when nobody waits any more for what it does.
     """
 
-    def __init__(self, name: str, scope: str) -> None:
+    def __init__(self, name: str, scope: str, environment_file: str) -> None:
         self.name = name
+        self._environment_file = environment_file
         self.abandoned = threading.Event()
         self._begun = 0
         self._restarts = '0'
@@ -43,8 +46,26 @@ class Service:
         """Where its file is."""
         if not self.is_user:
             return Path('/etc/systemd/system') / self.name
-        folder = os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config'
-        return Path(folder) / 'systemd/user' / self.name
+        return self._settings / 'systemd/user' / self.name
+
+    @property
+    def _settings(self) -> Path:
+        """What systemd puts in place of `%E`."""
+        own = os.environ.get('XDG_CONFIG_HOME') or Path.home() / '.config'
+        return Path(own) if self.is_user else Path('/etc')
+
+    @property
+    def environment_file(self) -> Path:
+        """Where variables are written that it reads."""
+        return Path(self._environment_file.replace('%E', str(self._settings)))
+
+    def variables(self) -> dict[str, str]:
+        """Return the variables that it gets: of its manager, and of its file."""
+        try:
+            text = self.environment_file.read_text(encoding='utf-8', errors='replace')
+        except FileNotFoundError:
+            text = ''
+        return _read_variables(self._run('show-environment')) | _read_variables(text)
 
     def why_unusable(self) -> str:
         """Return why this host cannot run it; empty if it can."""
@@ -183,3 +204,16 @@ def _has_succeeded(state: dict[str, str]) -> bool:
 
 def _user() -> str:
     return pwd.getpwuid(os.getuid()).pw_name
+
+
+def _read_variables(text: str) -> dict[str, str]:
+    """Return the variables of an `EnvironmentFile=`, see systemd.exec(5)."""
+    found = {}
+    for line in text.replace('\\\n', '').splitlines():
+        name, equals, value = line.strip().partition('=')
+        if equals and name.rstrip().isidentifier():
+            try:
+                found[name.rstrip()] = ' '.join(shlex.split(value))
+            except ValueError:
+                found[name.rstrip()] = value
+    return found
