@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError
 from composer.export.documents import render_document
 from composer.export.images import PROJECT, render_dockerfile
+from composer.export.parts import keep_apart
 
 if TYPE_CHECKING:
     from composer.export.parts import Export, HostPart
@@ -45,12 +46,17 @@ def render_files(export: Export) -> dict[str, str]:
             message = f"the service of host '{part.host}' has the name of another: '{name}'"
             raise ComposerError(message)
         services[name] = _service(export, part, build)
-    data = {'name': service_name(export.name), 'services': services}
+    data = {'name': project_name(export.name), 'services': services}
     return {FILE: render_document(data, _REMARKS)}
 
 
+def project_name(text: str) -> str:
+    """Return a name that Compose takes for projects; that of another system is another one."""
+    return keep_apart(text, service_name(text))
+
+
 def service_name(text: str) -> str:
-    """Return a name that Compose takes for services and projects."""
+    """Return a name that Compose takes for services."""
     return _NO_NAME.sub('-', text.lower()).strip('-_') or 'system'
 
 
@@ -63,7 +69,7 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
     inner = PROJECT / export.folder.relative_to(export.root)
     words = ['composer', *export.arguments(part, PROJECT)]
     # Docker would take an image without a tag for one of its own registry.
-    name = f'composer-{service_name(export.name)}:latest'
+    name = f'composer-{project_name(export.name)}:latest'
     service: dict[str, Any] = {'image': _literal(export.image or name)}
     service |= {'build': build} if build else {}
     service |= {'profiles': [service_name(part.host)]} if part.host else {}

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError, UsageError
 from composer.export.documents import render_document
 from composer.export.images import PROJECT
+from composer.export.parts import keep_apart
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,14 +25,17 @@ if TYPE_CHECKING:
 FILE = 'kubernetes.yaml'
 # A ConfigMap may have 1 MiB, with all that is around the files.
 _MOST_BYTES = 1_000_000
-_LONGEST_NAME = 52
+# What is added to names of pods leaves 52 characters, and a digest may be added here.
+_LONGEST_LABEL = 45
 _NO_NAME = re.compile(r'[^a-z0-9-]+')
 _NO_KEY = re.compile(r'[^A-Za-z0-9._-]')
 _USER = 1000
 _MARK = 'pyproject.toml'
+# As a name of a node in the cluster can be none of a host here.
+_HOST = 'composer/host'
 _REMARKS = {
     'replicas': 'Never two at a time: a StatefulSet starts none before the last one has ended.',
-    'kubernetes.io/hostname': 'The part of one host runs there and nowhere else.',
+    _HOST: f'The part of a host runs on the node with: kubectl label node NODE {_HOST}=HOST',
     'hostNetwork': 'ROS 2 finds others by multicast, which networks of pods do not carry.',
     'hostIPC': 'Pods on one computer exchange messages in shared memory, as one user.',
     'terminationGracePeriodSeconds': 'Composer stops its nodes, workers and processes first.',
@@ -55,7 +59,7 @@ def render_files(export: Export) -> dict[str, str]:
         raise UsageError(message, help=advice)
     files = _config_map(export)
     checksum = hashlib.sha256(repr(files).encode()).hexdigest()[:16]
-    names = [object_name(part.name) for part in export.parts]
+    names = [_name_part(part) for part in export.parts]
     for name in names:
         if names.count(name) > 1:
             message = f"two hosts have the same name for Kubernetes: '{name}'"
@@ -68,9 +72,25 @@ def render_files(export: Export) -> dict[str, str]:
     return {FILE: '---\n'.join([render_document(files), first, *others])}
 
 
-def object_name(text: str) -> str:
-    """Return a name that Kubernetes takes for objects, which is a label of DNS."""
-    return _NO_NAME.sub('-', text.lower())[:_LONGEST_NAME].strip('-') or 'system'
+def object_name(system: str) -> str:
+    """Return a name that Kubernetes takes for objects of a system.
+
+    That of another system is another one.
+    """
+    return keep_apart(system, _as_label(system))
+
+
+def _name_part(part: HostPart) -> str:
+    name = object_name(part.system)
+    whole = f'{name}-{part.host}' if part.host else name
+    return (
+        _as_label(whole) if len(whole) <= _LONGEST_LABEL else keep_apart(whole, _as_label(whole))
+    )
+
+
+def _as_label(text: str) -> str:
+    """Return a text as a label of DNS, to which a digest may be added."""
+    return _NO_NAME.sub('-', text.lower())[:_LONGEST_LABEL].strip('-') or 'system'
 
 
 def _config_map(export: Export) -> dict[str, Any]:
@@ -121,7 +141,7 @@ def _workload(
     export: Export, part: HostPart, name: str, files: dict[str, Any], checksum: str
 ) -> dict[str, Any]:
     labels = {'app.kubernetes.io/instance': name}
-    selector = {'nodeSelector': {'kubernetes.io/hostname': part.host}} if part.host else {}
+    selector = {'nodeSelector': {_HOST: part.host}} if part.host else {}
     items = [
         {
             'key': key,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -56,6 +57,7 @@ _ALWAYS_SET = frozenset(('HOME', 'LOGNAME', 'USER', 'SHELL', 'HOSTNAME', 'TMPDIR
 _STOP_MARGIN_SEC = 20.0
 # A value of fewer characters may stand in a longer one by chance.
 _FEWEST_CHARACTERS = 8
+_DIGEST_CHARACTERS = 6
 
 
 @record
@@ -206,6 +208,15 @@ def check_words(words: Sequence[str], read: Mapping[str, bool]) -> None:
                 message += 'could read in the files'
                 advice = f"leave it out: the system reads it itself, with env('{name}')"
                 raise ComposerError(message, help=advice)
+
+
+def keep_apart(text: str, name: str) -> str:
+    """Return a name that was made of a text, with a digest of the text if it is another one.
+
+    So `a@b` and `a:b` are not the same for who has names of fewer characters.
+    """
+    digest = hashlib.sha256(text.encode(errors='surrogateescape')).hexdigest()
+    return name if name == text else f'{name}-{digest[:_DIGEST_CHARACTERS]}'
 
 
 def describe(spec: SystemSpec) -> str:

@@ -147,9 +147,23 @@ def test_each_host_has_its_part(export, project, verify_unit):
     _files, *workloads = check_kubernetes(export('kubernetes', file))
     assert [each['metadata']['name'] for each in workloads] == ['robot-base', 'robot-jetson']
     pods = [each['spec']['template']['spec'] for each in workloads]
-    assert [each['nodeSelector']['kubernetes.io/hostname'] for each in pods] == ['base', 'jetson']
+    assert [each['nodeSelector']['composer/host'] for each in pods] == ['base', 'jetson']
     assert [each['terminationGracePeriodSeconds'] for each in pods] == [25, 55]
     assert pods[1]['containers'][0]['args'][-2:] == ['--host', 'jetson']
+
+
+def test_two_systems_never_have_one_name(export, project):
+    names = ['a-b', 'a@b', 'a:b', 'A-b', '日本', '中国', 'system', 'x' * 60, 'x' * 61]
+    taken, projects = set(), set()
+    for name in names:
+        file = project(FLEET, name)
+        for each in check_kubernetes(export('kubernetes', file)):
+            taken.add((each['kind'], each['metadata']['name']))
+        projects.add(check_compose(export('compose', file))['name'])
+    assert len(taken) == len(names) * 3
+    assert len(projects) == len(names)
+    assert ('ConfigMap', 'a-b') in taken
+    assert 'a-b' in projects
 
 
 def test_a_part_that_nobody_runs_is_an_error(export, project):
@@ -170,7 +184,7 @@ nodes:
 
 
 @pytest.mark.parametrize(
-    'name', ['a b', '100%', '$HOME', '"q"', "o'q", 'ünï 机', 'yes', '-x', 'a@b']
+    'name', ['a b', '100%', '$HOME', '"q"', "o'q", 'ünï 机', 'yes', '-x', 'a@b', 'x' * 60]
 )
 def test_awkward_names_and_values_arrive_as_they_were(export, project, verify_unit, name):
     file = project(ODD_SYSTEM, name)
