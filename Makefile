@@ -22,7 +22,7 @@ up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal $(ARGS)
 
 check: $(VENV)/ready
 	$(BIN)/ruff check .

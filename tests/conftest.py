@@ -10,7 +10,6 @@ from contextlib import ExitStack
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.distribution import FileScheduling, turn_of
 from tests.plugin import PLUGINS
 from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
@@ -30,17 +29,6 @@ settings.load_profile('steady')
 
 # A shell lets its jobs in the background ignore SIGINT, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def pytest_collection_modifyitems(items):
-    """Begin with what takes long."""
-    items.sort(key=lambda item: turn_of(item.nodeid))
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """Run the tests of a file in one process."""
-    return FileScheduling(config, log) if config.getoption('dist') == 'loadfile' else None
 
 
 def pytest_terminal_summary(terminalreporter):

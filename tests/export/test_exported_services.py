@@ -15,7 +15,7 @@ pytestmark = pytest.mark.ros
 
 SYSTEM = """
 version: 1
-hosts: {base: {address: 127.0.0.1}, arm: {address: 127.0.0.2}}
+hosts: {base: {address: 127.0.0.1}, arm: {address: 127.0.0.2, folder: arm}}
 network: {discovery: peers}
 nodes:
   talker:
