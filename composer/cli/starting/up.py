@@ -104,7 +104,7 @@ def up(  # noqa: PLR0913 - one for each option
     report = _show_errors if rehearses else show_findings
     report(told)
     if context is None or has_errors(told):
-        workers.kill_all()
+        workers.give_up()
         return ExitCode.FAILED
     check_ros()
     from composer.cli.starting.reload import Reloader
@@ -209,7 +209,7 @@ def _run(  # noqa: PLR0913 - as above
         with workers.importing():
             reading = import_reading(context, snapshot, report, workers)
         if reading is None:
-            workers.kill_all()
+            workers.give_up()
         if rehearses:
             # What modules of behaviours do at the exit is not for here.
             flush_output()

@@ -350,6 +350,12 @@ class Workers:
         codes = [code for code, _ in results if code]
         return codes[0] if codes else ExitCode.DONE, have_stopped and none_killed
 
+    def give_up(self) -> None:
+        """Kill all, and end what has started them: there is no system that they are of."""
+        for worker in self._coming.values():
+            self._supervisor.kill(worker.process)
+        self._supervisor.stop()
+
     def kill_all(self) -> None:
         """Kill all at once; a signal handler may call it."""
         self._supervisor.kill_all()
