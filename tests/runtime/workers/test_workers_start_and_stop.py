@@ -1,15 +1,18 @@
 """Nodes in workers start and stop with their system, as nodes of its own process do."""
 
+import os
 import signal
 
 import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.cli.main import run
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
     TALKS,
+    descendants,
     node,
     pid_of,
     system,
@@ -169,3 +172,15 @@ def test_a_worker_has_its_environment_its_cores_and_its_niceness(compose):
     )
     assert child.wait_for_line('has') == 'has front {1} 3'
     assert child.stop(signal.SIGTERM) == 0
+
+
+@pytest.mark.parametrize('code', ['', 'raise ValueError'], ids=['the check', 'the import'])
+def test_what_was_started_for_a_file_with_errors_ends(tmp_path, monkeypatch, capsys, code):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'parts.py').write_text(f'def begin(node): pass\n{code}\n')
+    name = 'begin' if code else 'other'
+    (tmp_path / 'a.yaml').write_text(system({'a': f'{{worker: left, on_start: parts:{name}}}'}))
+    before = descendants(os.getpid())
+    assert run(['up', 'a.yaml']) == 1
+    assert 'a.yaml:3:' in ''.join(capsys.readouterr())
+    wait_until_gone({*descendants(os.getpid())} - {*before})
