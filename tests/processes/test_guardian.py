@@ -195,13 +195,12 @@ def test_processes_of_behaviours_end_with_the_system(compose, worker):
 @PLACES
 def test_processes_of_behaviours_that_do_not_end_are_killed(compose, worker):
     start = "{behaviour: 'parts:start', with: {deaf: true}}"
-    child = compose(STARTING.format(0.5, start).replace('on_', f'{worker}on_'), CODE)
+    child = compose(STARTING.format(2, start).replace('on_', f'{worker}on_'), CODE)
     pids = started_by(child)
 
     assert child.stop() == 1
     assert not any(map(is_alive, pids))
-    # The others may be too slow on a busy machine.
-    assert len(child.matching(' outlived the system: killed')) >= 3
+    assert len(child.matching(' outlived the system: killed')) == 3
 
 
 def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_for):

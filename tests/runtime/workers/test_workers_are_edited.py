@@ -120,8 +120,11 @@ def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose):
         'far': nodes['far'],
         'bad': '{worker: third, on_start: {behaviour: parts:fail}}',
     }
+    code = CODE.replace(' hears ', ' gets ')
+    edit(compose, child, system(bad), code, fails=True)
+    assert not child.matching('far gets')
     other = 'workers: {right: {environment: {SENSOR: front}}}\n'
-    edit(compose, child, system(bad, other), CODE.replace(' hears ', ' gets '), fails=True)
+    edit(compose, child, system(bad, other), code, fails=True)
     assert all(map(is_there, pids))
     assert pid_of(child, 'talker', times=len(child.matching('talker begins'))) == pids[0]
     seen = len(child.matching('far reads'))
