@@ -1,6 +1,7 @@
 """What tests of running systems share, as fixtures."""
 
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from contextlib import ExitStack
 import pytest
 from hypothesis import HealthCheck, settings
 
+from composer.processes.guardian import RLIMIT_LOCKS
 from tests.plugin import PLUGINS
 from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
@@ -36,6 +38,16 @@ def pytest_terminal_summary(terminalreporter):
     for report in terminalreporter.stats.get('rerun', ()):
         terminalreporter.section(f'first run of {report.nodeid}')
         terminalreporter.line(report.longreprtext)
+
+
+@pytest.fixture(autouse=True)
+def process_of_no_system():
+    """Fail a test that runs, in this process, a system that ends the process seconds later."""
+    before = resource.getrlimit(RLIMIT_LOCKS)
+    yield
+    assert resource.getrlimit(RLIMIT_LOCKS) == before, (
+        'the guardian of a system has marked this process'
+    )
 
 
 @pytest.fixture(name='wait_for')

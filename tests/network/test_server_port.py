@@ -1,11 +1,15 @@
 """A part does not start without the port that its discovery server needs."""
 
+import os
 import socket
+import subprocess
+import sys
 
 import pytest
 
 from composer.cli.main import run
 from composer.network import local_networks
+from tests.running import ROOT
 
 SYSTEM = """\
 version: 1
@@ -17,22 +21,40 @@ nodes: {{there: {{host: arm}}, here: {{host: base, on_start: 'module:ends'}}}}
 MODULE = 'def ends(node):\n    node.shutdown()\n'
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize('is_taken', [True, False])
-def test_a_part_starts_only_if_the_port_of_its_server_is_free(
-    tmp_path, monkeypatch, capfd, is_taken
-):
+PROBLEM = 'the discovery server cannot run: UDP port {} of this host is in use'
+
+
+@pytest.fixture
+def port(tmp_path, monkeypatch):
+    """Return a port that is free; the part's file is in the working directory."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
-    monkeypatch.setattr(local_networks, '_PORT_SEC', 0.5)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        port = probe.getsockname()[1]
     (tmp_path / 'module.py').write_text(MODULE)
+    (tmp_path / 'robot.yaml').write_text(SYSTEM.format(port=port))
+    return port
+
+
+@pytest.mark.ros
+def test_a_part_does_not_start_while_the_port_of_its_server_is_taken(port, monkeypatch, capsys):
+    monkeypatch.setattr(local_networks, '_PORT_SEC', 0.5)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(('127.0.0.1', 0))
-        port = taken.getsockname()[1]
-        (tmp_path / 'robot.yaml').write_text(SYSTEM.format(port=port))
-        if not is_taken:
-            taken.close()
-        code = run(['up', 'robot.yaml', '--host', 'base'])
-    told = capfd.readouterr().err
-    problem = f'the discovery server cannot run: UDP port {port} of this host is in use'
-    assert (code, problem in told) == (int(is_taken), is_taken)
+        taken.bind(('127.0.0.1', port))
+        assert run(['up', 'robot.yaml', '--host', 'base']) == 1
+    assert PROBLEM.format(port) in capsys.readouterr().err
+
+
+@pytest.mark.ros
+def test_a_part_starts_when_the_port_of_its_server_is_free(port):
+    # In a process of its own, which ends with the system.
+    command = [sys.executable, '-m', 'composer', 'up', 'robot.yaml', '--host', 'base']
+    done = subprocess.run(
+        command,
+        env=os.environ | {'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, PROBLEM.format(port) in done.stderr) == (0, False), done.stderr
