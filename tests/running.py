@@ -38,6 +38,28 @@ def wait_for(condition, what):
     return result
 
 
+def descendants(pid):
+    """Return the IDs of all processes that a process has started, and they in turn."""
+    parents = {}
+    for folder in Path('/proc').iterdir():
+        with suppress(OSError, ValueError):
+            fields = (folder / 'stat').read_bytes().rpartition(b')')[2].split()
+            parents.setdefault(int(fields[1]), []).append(int(folder.name))
+    found, pending = [], [pid]
+    while pending:
+        below = parents.get(pending.pop(), [])
+        found += below
+        pending += below
+    return found
+
+
+def is_there(pid):
+    """Return whether a process runs."""
+    with suppress(OSError):
+        return Path(f'/proc/{pid}/stat').read_bytes().rpartition(b')')[2].split()[0] != b'Z'
+    return False
+
+
 @contextmanager
 def reserved_domain():
     """Return a ROS domain that no process is in, and that no other run of tests takes meanwhile."""

@@ -10,8 +10,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.processes import guardian
-from tests.running import DEADLINE_SEC, ROOT
-from tests.runtime.workers.observed import descendants
+from tests.running import DEADLINE_SEC, ROOT, descendants, is_there
 
 pytestmark = pytest.mark.ros
 
@@ -81,14 +80,6 @@ def started_by(child):
     child.wait_for_line(' stays', times=STARTED)
     child.wait_until_ready()
     return {int(line.split()[-2]) for line in child.matching(' stays')}
-
-
-def is_alive(pid):
-    try:
-        state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != 'Z'
 
 
 def worker_of(child):
@@ -185,7 +176,7 @@ def test_processes_of_behaviours_end_with_the_system(compose, worker):
     pids = started_by(child)
 
     assert child.stop() == 0
-    assert not any(map(is_alive, pids))
+    assert not any(map(is_there, pids))
     for pid in pids:
         assert child.matching(f'process {pid} (')
     assert len(child.matching('which a behaviour has started, still runs')) >= STARTED
@@ -199,7 +190,7 @@ def test_processes_of_behaviours_that_do_not_end_are_killed(compose, worker):
     pids = started_by(child)
 
     assert child.stop() == 1
-    assert not any(map(is_alive, pids))
+    assert not any(map(is_there, pids))
     assert len(child.matching(' outlived the system: killed')) == 3
 
 
@@ -208,7 +199,7 @@ def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_
     pids = started_by(child)
     child.send(signal.SIGKILL)
 
-    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
+    wait_for(lambda: not any(map(is_there, pids)), 'their end')
     for pid in pids:
         assert child.wait_for_line(f'process {pid} (').endswith(' outlived the system: killed')
 
@@ -219,7 +210,7 @@ def test_processes_of_behaviours_end_with_a_worker_that_is_killed(compose, wait_
     pids = started_by(child)
     os.kill(worker_of(child), signal.SIGKILL)
 
-    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
+    wait_for(lambda: not any(map(is_there, pids)), 'their end')
     for pid in pids:
         assert child.wait_for_line(f'process {pid} (').endswith(" outlived worker 'w': killed")
     assert child.stop() == 0
@@ -234,7 +225,7 @@ def test_processes_of_behaviours_end_with_a_worker_that_cannot_start_again(compo
     # Those of the second start; some of them end before they say anything.
     child.wait_for_line(" outlived worker 'w': killed", times=STARTED + 1)
     pids = {int(line.split()[-2]) for line in child.matching(' stays')}
-    wait_for(lambda: not any(map(is_alive, pids)), 'their end')
+    wait_for(lambda: not any(map(is_there, pids)), 'their end')
     assert child.stop() == 0
 
 
@@ -243,7 +234,7 @@ def test_a_system_does_without_its_guardian(compose, wait_for):
     child.wait_until_ready()
     guardian = guardian_of(child)
     os.kill(guardian, signal.SIGKILL)
-    wait_for(lambda: not is_alive(guardian), 'its end')
+    wait_for(lambda: not is_there(guardian), 'its end')
 
     assert child.stop() == 0
 
@@ -254,7 +245,7 @@ def test_the_guardian_ends_with_the_system(compose, wait_for):
     guardian = guardian_of(child)
 
     assert child.stop() == 0
-    wait_for(lambda: not is_alive(guardian), 'its end')
+    wait_for(lambda: not is_there(guardian), 'its end')
 
 
 def test_processes_of_a_program_that_calls_up_are_its_own(compose, start_program):
@@ -293,9 +284,9 @@ def test_the_guardian_of_a_service_ends_before_it(compose):
     child = compose(system, code)
     child.wait_until_ready()
     guarding = guardian_of(child)
-    assert is_alive(guarding)
+    assert is_there(guarding)
     child.send(signal.SIGTERM)
     # Its output ends with the guardian.
     code = child._process.wait(DEADLINE_SEC)
-    assert not is_alive(guarding)
+    assert not is_there(guarding)
     assert code == 0

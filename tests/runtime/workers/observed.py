@@ -1,9 +1,6 @@
 """Systems in workers, and what their processes are."""
 
-from contextlib import suppress
-from pathlib import Path
-
-from tests.running import wait_for
+from tests.running import is_there, wait_for
 
 # Each behaviour tells the process that it runs in.
 CODE = """
@@ -71,28 +68,6 @@ def system(nodes, more=''):
 def pid_of(child, name, *, times=1):
     """Return the process in which a node has begun."""
     return int(child.wait_for_line(f'{name} begins in', times=times).split()[-1])
-
-
-def descendants(pid):
-    """Return the IDs of all processes that a process has started, and they in turn."""
-    parents = {}
-    for folder in Path('/proc').iterdir():
-        with suppress(OSError, ValueError):
-            fields = (folder / 'stat').read_bytes().rpartition(b')')[2].split()
-            parents.setdefault(int(fields[1]), []).append(int(folder.name))
-    found, pending = [], [pid]
-    while pending:
-        below = parents.get(pending.pop(), [])
-        found += below
-        pending += below
-    return found
-
-
-def is_there(pid):
-    """Return whether a process runs."""
-    with suppress(OSError):
-        return Path(f'/proc/{pid}/stat').read_bytes().rpartition(b')')[2].split()[0] != b'Z'
-    return False
 
 
 def wait_until_gone(pids):

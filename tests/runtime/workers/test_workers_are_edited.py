@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from tests.running import is_there
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
     TALKS,
-    is_there,
     node,
     pid_of,
     system,

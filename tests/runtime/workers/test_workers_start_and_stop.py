@@ -8,11 +8,11 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run
+from tests.running import descendants
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
     TALKS,
-    descendants,
     node,
     pid_of,
     system,

@@ -8,13 +8,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from tests.running import wait_for
+from tests.running import descendants, is_there, wait_for
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
     TALKS,
-    descendants,
-    is_there,
     node,
     pid_of,
     system,

@@ -5,12 +5,12 @@ import select
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from composer.scenarios.running.case_process import CaseProcess
 from composer.scenarios.running.case_results import CaseResult
+from tests.running import is_there
 
 DEADLINE_SEC = 30
 
@@ -85,21 +85,13 @@ def test_what_does_not_end_is_ended_and_shown(function):
     assert f'in {function.__name__}' in failure.stack
 
 
-def is_alive(pid):
-    try:
-        status = Path(f'/proc/{pid}/stat').read_text()
-    except FileNotFoundError:
-        return False
-    return status.rpartition(')')[2].split()[0] != 'Z'
-
-
 def test_what_it_has_started_ends_with_it(wait_for):
     def start():
         child = subprocess.Popen(['sleep', '1000'])
         return CaseResult(notices=(str(child.pid),))
 
     pid = int(run(start).notices[0])
-    wait_for(lambda: not is_alive(pid), 'the end of what it has started')
+    wait_for(lambda: not is_there(pid), 'the end of what it has started')
 
 
 def test_of_much_output_the_end_is_kept():
