@@ -44,6 +44,9 @@ clean:
 
 $(VENV)/ready: pyproject.toml Makefile
 	@echo 'setting up $(VENV), which takes about a minute'
+	@# One whose set-up was interrupted may have halves of packages.
+	@test -e $@ || rm -rf $(VENV)
+	@rm -f $@
 	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
 	@touch $@

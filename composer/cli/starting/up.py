@@ -98,38 +98,39 @@ def up(  # noqa: PLR0913 - one for each option
     if ends_process:
         note_start()
     reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
-    workers = Workers(ros_arguments, log_levels)
     begun_ns = time_ns()
-    context, _files, told = reader.read(loaded=lambda system: _spawn_early(workers, system, host))
-    report = _show_errors if rehearses else show_findings
-    report(told)
-    if context is None or has_errors(told):
-        workers.give_up()
-        return ExitCode.FAILED
-    check_ros()
-    from composer.cli.starting.reload import Reloader
-
-    if not rehearses:
-        wait_for_network(context.spec, lambda text: click.echo(text, err=True))
-        wait_for_port(context.spec)
-    variables = _find_variables(context.spec, rehearses=rehearses)
-    with shell_environment_kept(), environment_set({**find_colour(), **variables}):
-        check_shell(variables)
-        check_log_folder(ros_arguments)
-        check_middleware(os.environ)
-        return _run(
-            context,
-            lambda prefixes: Reloader(reader, context, prefixes, begun_ns, told),
-            workers,
-            ros_arguments,
-            log_levels,
-            watches=watches,
-            is_asked=is_asked,
-            recording=recording or RecordingOptions(),
-            hold=hold,
-            ends_process=ends_process,
-            rehearses=rehearses,
+    with Workers(ros_arguments, log_levels) as workers:
+        context, _files, told = reader.read(
+            loaded=lambda system: _spawn_early(workers, system, host)
         )
+        report = _show_errors if rehearses else show_findings
+        report(told)
+        if context is None or has_errors(told):
+            return ExitCode.FAILED
+        check_ros()
+        from composer.cli.starting.reload import Reloader
+
+        if not rehearses:
+            wait_for_network(context.spec, lambda text: click.echo(text, err=True))
+            wait_for_port(context.spec)
+        variables = _find_variables(context.spec, rehearses=rehearses)
+        with shell_environment_kept(), environment_set({**find_colour(), **variables}):
+            check_shell(variables)
+            check_log_folder(ros_arguments)
+            check_middleware(os.environ)
+            return _run(
+                context,
+                lambda prefixes: Reloader(reader, context, prefixes, begun_ns, told),
+                workers,
+                ros_arguments,
+                log_levels,
+                watches=watches,
+                is_asked=is_asked,
+                recording=recording or RecordingOptions(),
+                hold=hold,
+                ends_process=ends_process,
+                rehearses=rehearses,
+            )
 
 
 def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
@@ -208,8 +209,6 @@ def _run(  # noqa: PLR0913 - as above
 
         with workers.importing():
             reading = import_reading(context, snapshot, report, workers)
-        if reading is None:
-            workers.give_up()
         if rehearses:
             # What modules of behaviours do at the exit is not for here.
             flush_output()

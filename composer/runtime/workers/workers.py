@@ -13,7 +13,7 @@ import threading
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.bindings import system_bindings
@@ -53,6 +53,8 @@ _EXIT_SEC = 5.0
 class Workers:
     """Starts, asks, edits and stops the workers of a system.
 
+    As a context manager, it ends those that no system has got.
+
     Args:
         ros_arguments: The arguments after `--ros-args` of the command line.
         log_levels: The log levels of the command line.
@@ -80,6 +82,16 @@ class Workers:
         self._watch = WorkerWatch(self._list, self._keeper.log)
         self._stops: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
         self._stopping = 0
+        self._is_bound = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if not self._is_bound:
+            for worker in self._coming.values():
+                self._supervisor.kill(worker.process)
+            self._supervisor.stop()
 
     def _list(self) -> list[Worker]:
         return list(self._workers.values())
@@ -193,6 +205,7 @@ class Workers:
 
     def bind(self, system: SystemOfWorkers, reading: Reading) -> None:
         """Be the workers of a system that runs as `reading`, from its start on."""
+        self._is_bound = True
         self._calls.system = system
         self._workers, self._coming = self._coming, {}
         self._supervisor.timeout_sec = reading.spec.shutdown_timeout_sec
@@ -349,12 +362,6 @@ class Workers:
         none_killed = self._supervisor.stop()
         codes = [code for code, _ in results if code]
         return codes[0] if codes else ExitCode.DONE, have_stopped and none_killed
-
-    def give_up(self) -> None:
-        """Kill all, and end what has started them: there is no system that they are of."""
-        for worker in self._coming.values():
-            self._supervisor.kill(worker.process)
-        self._supervisor.stop()
 
     def kill_all(self) -> None:
         """Kill all at once; a signal handler may call it."""

@@ -174,13 +174,23 @@ def test_a_worker_has_its_environment_its_cores_and_its_niceness(compose):
     assert child.stop(signal.SIGTERM) == 0
 
 
-@pytest.mark.parametrize('code', ['', 'raise ValueError'], ids=['the check', 'the import'])
-def test_what_was_started_for_a_file_with_errors_ends(tmp_path, monkeypatch, capsys, code):
+@pytest.mark.parametrize(
+    ('name', 'code', 'log_folder', 'problem'),
+    [
+        ('other', '', '', 'a.yaml:3:'),
+        ('begin', 'raise ValueError', '', 'a.yaml:3:'),
+        ('begin', '', '/proc/new', 'ROS cannot keep its log files'),
+    ],
+    ids=['the check', 'the import', 'the environment'],
+)
+def test_what_was_started_for_a_system_that_cannot_start_ends(
+    tmp_path, monkeypatch, capsys, name, code, log_folder, problem
+):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('ROS_LOG_DIR', log_folder)
     (tmp_path / 'parts.py').write_text(f'def begin(node): pass\n{code}\n')
-    name = 'begin' if code else 'other'
     (tmp_path / 'a.yaml').write_text(system({'a': f'{{worker: left, on_start: parts:{name}}}'}))
     before = descendants(os.getpid())
     assert run(['up', 'a.yaml']) == 1
-    assert 'a.yaml:3:' in ''.join(capsys.readouterr())
+    assert problem in ''.join(capsys.readouterr())
     wait_until_gone({*descendants(os.getpid())} - {*before})
