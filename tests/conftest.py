@@ -15,6 +15,7 @@ from composer.processes.guardian import RLIMIT_LOCKS
 from tests.plugin import PLUGINS
 from tests.recorded import filled
 from tests.running import DEADLINE_SEC, ROOT, Composing, Peer, reserved_domain, wait_for
+from tests.terminal_screen import Terminal
 
 # The scenarios of the shipped systems are tests, too; `pytester` runs pytest within tests.
 pytest_plugins = ('pytester', *PLUGINS)
@@ -72,18 +73,12 @@ def other_domain_id():
 
 @pytest.fixture
 def terminal(tmp_path):
-    """Run a command in a terminal of 100 by 12; return what types keys, and what it shows."""
+    """Return a terminal, with what types keys and reads the screen."""
     if shutil.which('tmux') is None:
         pytest.skip('tmux is not installed')
-
-    def tmux(*words):
-        command = ['tmux', '-S', str(tmp_path / 'tmux'), '-f', '/dev/null', *words]
-        # Without `LINES` and `COLUMNS`, which readline sets as pytest loads it: curses heeds them.
-        done = subprocess.run(command, env=os.environ, capture_output=True, text=True, check=True)
-        return done.stdout
-
-    yield tmux
-    subprocess.run(['tmux', '-S', str(tmp_path / 'tmux'), 'kill-server'], check=False)
+    terminal = Terminal(tmp_path / 'tmux')
+    yield terminal
+    terminal.end()
 
 
 @pytest.fixture(scope='session')

@@ -63,23 +63,16 @@ def test_top_draws_all_hosts_on_a_screen_until_one_is_lost(project, terminal):
     options = project.options
     variables = [f'{key}={options["env"][key]}' for key in ('HOME', 'PYTHONPATH', 'PATH')]
     command = shlex.join(['env', *variables, *project.bed.command(*project.words('top'))])
-    shell = f'cd {options["cwd"]}; {command}; echo exit code $?; read'
-    terminal('new-session', '-d', '-x', '140', '-y', '12', shell)
-
-    def shows(*parts):
-        def is_shown():
-            screen = terminal('capture-pane', '-p')
-            return all(part in screen for part in parts) and screen
-
-        return wait_for(is_shown, f'{parts} on the screen')
-
-    shows('robot: 3 of 3 entities', '/talker: timer tick', '/listener: subscription', 'HOST')
+    terminal.run(f'cd {options["cwd"]}; {command}', columns=140)
+    terminal.shows(
+        'robot: 3 of 3 entities', '/talker: timer tick', '/listener: subscription', 'HOST'
+    )
     project.rear.kill()
-    shows('robot: 2 of 2 entities', '/talker: timer tick', 'host rear')
+    terminal.shows('robot: 2 of 2 entities', '/talker: timer tick', 'host rear')
     project.rear.boot()
-    shows('robot: 3 of 3 entities', '/listener: subscription')
-    terminal('send-keys', 'q')
-    shows('exit code 0')
+    terminal.shows('robot: 3 of 3 entities', '/listener: subscription')
+    terminal.type('q')
+    terminal.shows('exit code 0')
     wait_for(
         lambda: 'composer top' not in project.front.run('ps', '-eo', 'args').stdout,
         'the end of what the screen has started',

@@ -248,40 +248,34 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
     path = f'PYTHONPATH={ROOT}:{os.environ.get("PYTHONPATH", "")}'
     domain = f'ROS_DOMAIN_ID={compose.domain_id}'
     command = shlex.join(['env', path, domain, sys.executable, '-m', 'composer', 'top'])
-    shell = f'{command}; echo exit code $?; read'
-    terminal('new-session', '-d', '-x', '100', '-y', '12', shell)
-
-    def shows(*parts):
-        def is_shown():
-            screen = terminal('capture-pane', '-p')
-            return all(part in screen for part in parts) and screen
-
-        return wait_for(is_shown, f'{parts} on the screen')
-
+    terminal.run(command)
     # On a crowded machine, the first figures may mislead.
-    wait_for(
-        lambda: (
-            '/arm: timer busy'
-            in shows('system: 3 of 3 entities, by cpu', '%', '/arm: timer busy').splitlines()[2]
+    terminal.wait_until(
+        lambda lines: (
+            'system: 3 of 3 entities, by cpu' in lines[0]
+            and '/arm: timer busy' in lines[2]
+            and '%' in lines[2]
         ),
         'the busy one on top',
     )
-    terminal('send-keys', 'Right', 'r')
-    shows('by gil, reversed')
-    terminal('send-keys', '/', 'e', 'a', 'r', 'Enter')
-    screen = shows('system: 1 of 3 entities', 'filter: ear', '/robot/ear: subscription numbers')
-    assert 'busy' not in screen
-    terminal('send-keys', 'Escape')
-    shows('3 of 3')
-    terminal('resize-window', '-x', '50', '-y', '5')
-
-    def is_small():
-        lines = terminal('capture-pane', '-p').splitlines()
-        return len(lines) == 5 and 'ERRORS' not in lines[1] and lines[4].startswith('q quit')
-
-    wait_for(is_small, 'a small one')
-    terminal('send-keys', 'q')
-    shows('exit code 0')
+    terminal.type('Right', 'r')
+    terminal.shows('by gil, reversed')
+    terminal.type('/', 'e', 'a', 'r', 'Enter')
+    lines = terminal.shows(
+        'system: 1 of 3 entities', 'filter: ear', '/robot/ear: subscription numbers'
+    )
+    assert not [line for line in lines if 'busy' in line]
+    terminal.type('Escape')
+    terminal.shows('3 of 3')
+    terminal.resize(50, 5)
+    terminal.wait_until(
+        lambda lines: (
+            len(lines) == 5 and 'ERRORS' not in lines[1] and lines[4].startswith('q quit')
+        ),
+        'a small one',
+    )
+    terminal.type('q')
+    terminal.shows('exit code 0')
     assert child.stop() == 0
 
 
