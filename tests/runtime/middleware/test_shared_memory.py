@@ -4,6 +4,7 @@ import fcntl
 import os
 import re
 import signal
+import struct
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,63 @@ def test_a_link_is_kept(folder):
 def test_a_folder_that_is_not_there_is_no_error(folder, monkeypatch):
     monkeypatch.setattr(shared_memory, '_FOLDER', folder / 'nowhere')
     shared_memory.remove_left_segments()
+
+
+PORT, NODE_OFFSET, FLAGS_OFFSET = 7411, 256, 300
+OK_AND_OPENED = 7
+
+
+def write_port(path, number=PORT):
+    """Write a port of shared memory: in its node, its number, two times and the flags count."""
+    node = struct.pack('<qIII5III', 5, 2, 600, 700, number, 1, 1000, 333, 512, 1, OK_AND_OPENED)
+    path.write_bytes(b'\1' * NODE_OFFSET + node + b'\2' * 2000)
+    return path.read_bytes()
+
+
+def replace_port(folder, number=PORT, new=PORT):
+    """Return what others have mapped before and after a port is replaced by that of a new process."""
+    path = folder / f'fastrtps_port{PORT}'
+    before = write_port(path, number)
+    with path.open('rb') as mapped:
+        with shared_memory.replacing_ports():
+            path.unlink()
+            content = write_port(path, new)
+        assert path.read_bytes() == content
+        return before, mapped.read()
+
+
+def test_a_port_that_is_replaced_is_marked_as_unusable(folder):
+    before, after = replace_port(folder)
+    assert [at for at in range(len(before)) if before[at] != after[at]] == [FLAGS_OFFSET]
+    assert (before[FLAGS_OFFSET], after[FLAGS_OFFSET]) == (OK_AND_OPENED, OK_AND_OPENED - 1)
+
+
+def test_a_port_that_is_removed_is_marked_as_unusable(folder):
+    path = folder / f'fastdds_port{PORT}'
+    write_port(path)
+    with path.open('rb') as mapped:
+        with shared_memory.replacing_ports():
+            path.unlink()
+        assert mapped.read()[FLAGS_OFFSET] == OK_AND_OPENED - 1
+
+
+def test_a_port_that_is_not_replaced_stays(folder):
+    path = folder / f'fastrtps_port{PORT}'
+    before = write_port(path)
+    with shared_memory.replacing_ports():
+        pass
+    assert path.read_bytes() == before
+
+
+def test_a_file_of_another_content_than_a_port_stays(folder):
+    before, after = replace_port(folder, number=PORT + 1)
+    assert before == after
+
+
+def test_a_port_of_another_user_stays(folder, monkeypatch):
+    monkeypatch.setattr(os, 'geteuid', lambda: os.getuid() + 1)
+    before, after = replace_port(folder)
+    assert before == after
 
 
 def locks_of(child):
