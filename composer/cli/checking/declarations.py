@@ -13,6 +13,7 @@ from composer.cli.common.argument_types import (
     check_rules,
     refuse_options,
     split_words,
+    takes_format,
     takes_host,
     takes_settings,
     takes_system,
@@ -35,14 +36,7 @@ _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
     help='Check the system in each combination of arguments, layers and settings that this file '
     "names, instead of those under 'check:'.",
 )
-@click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(list(FORMATS)),
-    default='text',
-    show_default=True,
-    help='The format of the report.',
-)
+@takes_format(list(FORMATS), 'The format of the report.')
 @click.option(
     '--output',
     type=click.Path(path_type=Path, dir_okay=False),
@@ -158,14 +152,7 @@ def check_command(  # noqa: PLR0913 - one for each option
 )
 @takes_settings
 @takes_host
-@click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(['text', 'json']),
-    default='text',
-    show_default=True,
-    help='The output format.',
-)
+@takes_format()
 @click.option(
     '--exit-code',
     'tells_difference',

@@ -69,6 +69,20 @@ def takes_topics(command: _Command) -> _Command:
     return topics_option(command)
 
 
+def takes_format(
+    names: Sequence[str] = ('text', 'json'), what: str = 'The output format.'
+) -> Callable[[_Command], _Command]:
+    """Add `--format` (`format_name`) to a command; the first one is the default."""
+    return click.option(
+        '--format',
+        'format_name',
+        type=click.Choice(names),
+        default=names[0],
+        show_default=True,
+        help=what,
+    )
+
+
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Split the words of the current command into files and the arguments that follow them.
 

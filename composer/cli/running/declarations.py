@@ -11,6 +11,7 @@ import click
 from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
     split_words,
+    takes_format,
     takes_settings,
     takes_system,
 )
@@ -31,14 +32,6 @@ _timeout = click.option(
     show_default=True,
     metavar='SEC',
     help='How long to wait for the end of it.',
-)
-_format = click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(['text', 'json']),
-    default='text',
-    show_default=True,
-    help='The output format.',
 )
 
 
@@ -69,7 +62,7 @@ def _takes_asked(command: Callable[..., int]) -> Callable[..., int]:
 
 @click.command('ps')
 @_takes_asked
-@_format
+@takes_format()
 def ps_command(asked: AskedSystem, format_name: str) -> int:
     """List the systems that run on this ROS graph, or SYSTEM alone.
 
@@ -88,7 +81,7 @@ def ps_command(asked: AskedSystem, format_name: str) -> int:
 @click.command('top')
 @_takes_asked
 @click.option('--once', is_flag=True, help='Print the table once.')
-@_format
+@takes_format()
 @click.option(
     '--sort',
     type=click.Choice(list(SORT_NAMES)),
@@ -209,13 +202,8 @@ def logs_command(asked: AskedSystem, *, follows: bool) -> int:
     metavar='FILE',
     help='The file to write. Default: standard output.',
 )
-@click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(['yaml', 'nodl', 'nodl-xml']),
-    default='yaml',
-    show_default=True,
-    help='What to write: processes of a system, or a NoDL document.',
+@takes_format(
+    ['yaml', 'nodl', 'nodl-xml'], 'What to write: processes of a system, or a NoDL document.'
 )
 @click.option(
     '--timeout',
@@ -272,14 +260,7 @@ def capture_command(
     metavar='LAYER',
     help='Write the layer file for it.',
 )
-@click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(['text', 'json']),
-    default='text',
-    show_default=True,
-    help='The output format.',
-)
+@takes_format()
 def suggest_command(  # noqa: PLR0913 - one for each option
     words: tuple[str, ...],
     set_values: tuple[str, ...],

@@ -10,6 +10,7 @@ from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
     refuse_together,
     split_words,
+    takes_format,
     takes_system,
 )
 from composer.drawing import FORMATS as PICTURE_FORMATS
@@ -17,14 +18,7 @@ from composer.drawing import FORMATS as PICTURE_FORMATS
 
 @click.command('show', context_settings=NUMBERS_ARE_VALUES)
 @takes_system
-@click.option(
-    '--format',
-    'output_format',
-    type=click.Choice(['yaml', 'json']),
-    default='yaml',
-    show_default=True,
-    help='The output format.',
-)
+@takes_format(['yaml', 'json'])
 @click.option('--origin', is_flag=True, help='Add to each value where it comes from.')
 @click.option(
     '--args', 'wants_arguments', is_flag=True, help='List the arguments that FILE declares.'
@@ -38,7 +32,7 @@ from composer.drawing import FORMATS as PICTURE_FORMATS
 def show_command(
     words: tuple[str, ...],
     set_values: tuple[str, ...],
-    output_format: str,
+    format_name: str,
     *,
     origin: bool,
     wants_arguments: bool,
@@ -56,7 +50,7 @@ def show_command(
             '--args': wants_arguments,
             '--params': wants_parameters,
             '--origin': origin,
-            '--format json': output_format == 'json',
+            '--format json': format_name == 'json',
         }
     )
     paths, arguments = split_words(words)
@@ -64,7 +58,7 @@ def show_command(
         return show_arguments(paths, set_values)
     if wants_parameters:
         return show_parameters(paths, arguments, set_values)
-    return show(paths, arguments, set_values, output_format=output_format, origins=origin)
+    return show(paths, arguments, set_values, format_name=format_name, origins=origin)
 
 
 @click.command('graph', context_settings=NUMBERS_ARE_VALUES)

@@ -45,7 +45,7 @@ def show(
     words: Sequence[str],
     set_values: Sequence[str],
     *,
-    output_format: str,
+    format_name: str,
     origins: bool,
 ) -> int:
     """Print the final system; return the exit code.
@@ -58,7 +58,7 @@ def show(
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
     data = final_data(system)
-    if output_format == 'json':
+    if format_name == 'json':
         click.echo(json.dumps(data, indent=2))
     else:
         remark = (lambda path: describe_origin(system, path)) if origins else None

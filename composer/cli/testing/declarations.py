@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from composer.cli.common.argument_types import takes_format
 from composer.cli.testing.scenario_selection import DEFAULT_PATTERN
 
 FORMATS = ('text', 'json', 'github')
@@ -49,14 +50,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 )
 @click.option('--trace', type=_file, help='Write each event to this file, a line each.')
 @click.option('--junit', type=_file, help='Write a report in the format of JUnit to this file.')
-@click.option(
-    '--format',
-    'format_name',
-    type=click.Choice(FORMATS),
-    default='text',
-    show_default=True,
-    help='The output format.',
-)
+@takes_format(FORMATS)
 @click.option(
     '-s', 'shows_output', is_flag=True, help='Show at once what behaviours print and log.'
 )
