@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from composer.checks.placement.crossing_messages import is_big
 from composer.drawing.delivery import deliveries_of
 from composer.errors import ComposerError
-from composer.inference.shared_names import SharedNames
+from composer.inference.sharing.shared_names import SharedNames
 from composer.language.specs import NodeSpec
 from composer.suggestions.loads import Flow, NodeLoad, SystemLoad
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
-    from composer.inference.shared_names import SharedName
+    from composer.inference.sharing.shared_functions import SharedName
     from composer.language.specs import SystemSpec
     from composer.suggestions.figures import EntityFigures, Measured
 
@@ -148,7 +148,8 @@ def _find_sharing(context: CheckContext, spec: SystemSpec) -> Iterator[frozenset
                     known.setdefault(name, set()).add(node.full_name)
     for name, changers in changed.items():
         # Where a node changes it itself, each process may have its own.
-        readers = read.get(name, set()) - changers
+        seen_by = [nodes for each, nodes in read.items() if names.find_touched([name], each)]
+        readers = set[str]().union(*seen_by) - changers
         if readers:
             yield frozenset(readers | changers)
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.placement.crossings import Place, locate
 from composer.diagnostics import Related
-from composer.inference.shared_names import SharedNames
+from composer.inference.sharing.shared_names import SharedNames
 from composer.language.bindings import exit_bindings
 
 if TYPE_CHECKING:
@@ -15,16 +15,21 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.shared_names import SharedName
+    from composer.inference.sharing.shared_functions import SharedName
     from composer.language.bindings import Binding
+
+
+# Who uses a name, and the line.
+_Users: TypeAlias = dict['SharedName', tuple['Binding', 'Span']]
 
 
 @dataclass(slots=True)
 class _Uses:
-    """Where a name is used: the first behaviour of each place, and the line."""
+    """What the behaviours of a place do with objects: the first of them for each."""
 
-    read: dict[Place, tuple[Binding, Span]] = field(default_factory=dict)
-    changed: dict[Place, tuple[Binding, Span]] = field(default_factory=dict)
+    read: _Users = field(default_factory=dict)
+    changed: _Users = field(default_factory=dict)
+    made: _Users = field(default_factory=dict)
 
 
 def check_shared_objects(context: CheckContext) -> Iterator[Diagnostic]:
@@ -32,17 +37,21 @@ def check_shared_objects(context: CheckContext) -> Iterator[Diagnostic]:
     if len({place for place, _ in _list_placed(context)}) < _SEVERAL:
         return
     names = SharedNames(context.modules)
-    found: dict[SharedName, _Uses] = {}
+    places: dict[Place, _Uses] = {}
     for place, binding in _list_placed(context):
         if context.was_dropped(binding.behaviour.path):
             continue
         uses = names.uses_of(binding.behaviour.module, binding.behaviour.function)
-        for name, span in uses.read.items():
-            found.setdefault(name, _Uses()).read.setdefault(place, (binding, span))
-        for name, span in uses.changed.items():
-            found.setdefault(name, _Uses()).changed.setdefault(place, (binding, span))
-    for name, each in found.items():
-        yield from _check(context, name, each)
+        known = places.setdefault(place, _Uses())
+        for users, found in (
+            (known.read, uses.read),
+            (known.changed, uses.changed),
+            (known.made, uses.made),
+        ):
+            for name, span in found.items():
+                users.setdefault(name, (binding, span))
+    for place in places:
+        yield from _check(context, names, place, places)
 
 
 _SEVERAL = 2
@@ -57,20 +66,28 @@ def _list_placed(context: CheckContext) -> Iterator[tuple[Place, Binding]]:
             yield (process.host, ''), binding
 
 
-def _check(context: CheckContext, name: SharedName, uses: _Uses) -> Iterator[Diagnostic]:
-    """Check a name; where it is changed as well as read, each process may have its own."""
-    for place, (binding, span) in uses.read.items():
-        others = [each for each in uses.changed if each != place]
-        if not others or place in uses.changed:
+def _check(
+    context: CheckContext, names: SharedNames, place: Place, places: dict[Place, _Uses]
+) -> Iterator[Diagnostic]:
+    """Check what a place reads; where it is changed as well, each process may have its own."""
+    uses = places[place]
+    for name, (binding, span) in uses.read.items():
+        if names.find_touched(uses.changed, name):
             continue
-        changer, changed_at = uses.changed[others[0]]
-        where, elsewhere = locate(place), locate(others[0])
-        yield context.at_value(
-            binding.behaviour.path,
-            'shared-across-workers',
-            f"'{binding.behaviour.name}' {where} reads '{name[1]}' of the module '{name[0]}', "
-            f"which only '{changer.behaviour.name}' {elsewhere} changes",
-            part=binding.behaviour.name,
-            help='publish it, make it a parameter, or let both nodes run in one worker',
-            related=[Related('read here', span), Related('changed here', changed_at)],
-        )
+        is_made = names.find_touched(uses.made, name) is not None
+        for other, theirs in places.items():
+            changes = theirs.changed if is_made else theirs.made | theirs.changed
+            changed = names.find_touched(changes, name) if other != place else None
+            if changed is None:
+                continue
+            changer, changed_at = changes[changed]
+            yield context.at_value(
+                binding.behaviour.path,
+                'shared-across-workers',
+                f"'{binding.behaviour.name}' {locate(place)} reads '{name[1]}' of the module "
+                f"'{name[0]}', which only '{changer.behaviour.name}' {locate(other)} changes",
+                part=binding.behaviour.name,
+                help='publish it, make it a parameter, or let both nodes run in one worker',
+                related=[Related('read here', span), Related('changed here', changed_at)],
+            )
+            break
