@@ -164,7 +164,8 @@ class WaitingStarter:
             for condition in missing:
                 if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
                     raise self._error(waiter, condition, graph)
-                self._notice(waiter, condition).log_if_due(begun)
+                # At the same time: what has waited long enough has no notice first.
+                self._notice(waiter, condition).log_if_due(begun, now)
         for waiter in ready:
             if not stop.is_set:
                 waiter.start()

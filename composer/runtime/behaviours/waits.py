@@ -52,9 +52,14 @@ class WaitNotice:
         self._what = what
         self._last = float('-inf')
 
-    def log_if_due(self, begun: float) -> None:
-        """Log it, if that is due for a wait that began at a time of `time.monotonic`."""
-        now = monotonic()
+    def log_if_due(self, begun: float, now: float | None = None) -> None:
+        """Log it, if that is due for a wait that began at a time of `time.monotonic`.
+
+        Args:
+            begun: When the wait began.
+            now: When the caller looked whether it has ended; `None` for this moment.
+        """
+        now = monotonic() if now is None else now
         if now - begun >= _FIRST_NOTICE_SEC and now - self._last >= _NOTICE_PERIOD_SEC:
             self._last = now
             self._log(f'Waiting for {self._what}…')
