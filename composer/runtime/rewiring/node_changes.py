@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from composer.language.specs import NodeSpec
     from composer.planning.plan import Operation, Plan, Target
+    from composer.runtime.entities.parameters import NodeParameters
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
@@ -128,6 +129,11 @@ class NodeChange:
         self._node.functions = self._old.functions
         self._node.change(noun, spec, entity)
 
+    def _ask_as_before(self, parameters: NodeParameters) -> None:
+        # As above.
+        self._node.functions = self._old.functions
+        parameters.ask(self._before)
+
     def _create(self, target: Target, spec: Any) -> LiveEntity:
         """Create an entity; one whose topic gets another type when the old ends have gone."""
         deadline = monotonic() + (_GONE_SEC if target in self._clashing else 0.0)
@@ -152,7 +158,7 @@ class NodeChange:
             transaction.on_undo(set_level, before, requests)
             set_level(spec, requests)
         if keys & {*PARAMETER_HOOKS, 'on_error', 'warn_after'} and node.parameters:
-            transaction.on_undo(node.parameters.ask, before)
+            transaction.on_undo(self._ask_as_before, node.parameters)
             node.parameters.ask(spec)
         if keys & {'on_error', 'warn_after'}:
             # Their behaviours have no such keys of their own.

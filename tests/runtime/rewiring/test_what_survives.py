@@ -419,6 +419,19 @@ def test_clocks_and_parameter_files_stay_if_something_else_fails(edited):
     assert (edited.get('size'), edited.get('use_sim_time')) == (7, True)
 
 
+def test_changes_are_decided_by_the_old_code_if_something_else_fails(edited):
+    code = 'FIRST = 0\n\n\ndef decide(node, changes):\n    return "%s"\n\n\n'
+    asking = {'  clock:': '  clock:\n    on_parameters: parts:decide'}
+    edited.edit({**asking, 'FIRST = 0': code % 'old'})
+    failing = {
+        'FIRST = 0': f'{code % "new"}def fail(change, changes):\n    return "no"\n',
+        '  ear:': '  ear:\n    use_sim_time: true\n    on_parameters: parts:fail',
+    }
+    _, said = edited.edit({**asking, **failing})
+    assert said == "not reloaded: parameter 'use_sim_time' of 'ear': no"
+    assert edited.set('speed', 2.0) == 'old'
+
+
 def test_a_recreated_entity_is_there_again_if_something_else_fails(edited):
     other_qos = {'Int32, external: true': 'Int32, external: true, qos: 7'}
     failing = {
