@@ -170,7 +170,7 @@ def test_a_worker_has_its_environment_its_cores_and_its_niceness(compose):
         ),
         code,
     )
-    assert child.wait_for_line('has') == 'has front {1} 3'
+    assert child.wait_for_line('has') == f'has front {{1}} {os.nice(0) + 3}'
     assert child.stop(signal.SIGTERM) == 0
 
 
