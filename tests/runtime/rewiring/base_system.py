@@ -285,6 +285,7 @@ _AFAR = {
     **_COUNTING,
 }
 WITNESS_NODES = {'witness': WITNESS_NODE, 'witness_afar': _AFAR}
+WITNESSES = tuple(f'/{each}' for each in WITNESS_NODES)
 
 SYSTEM = {
     'version': 1,
@@ -322,11 +323,11 @@ SYSTEM = {
                 'more': {'type': _STRING, 'topic': '{{ where }}', 'external': True},
             },
             'timers': {
-                'tick': {'period': 0.02, 'behaviour': 'parts:tick', 'publish': 'out'},
-                'steps': {'period': 0.03, 'behaviour': 'parts:steps', 'publish': 'more'},
-                'later': {'period': 0.04, 'behaviour': 'parts:tick_later'},
-                'steps_later': {'period': 0.03, 'behaviour': 'parts:steps_later'},
-                'constant': {'rate': 20.0, 'publish': 'out', 'message': 'hello'},
+                'tick': {'period': 0.05, 'behaviour': 'parts:tick', 'publish': 'out'},
+                'steps': {'period': 0.06, 'behaviour': 'parts:steps', 'publish': 'more'},
+                'later': {'period': 0.08, 'behaviour': 'parts:tick_later'},
+                'steps_later': {'period': 0.07, 'behaviour': 'parts:steps_later'},
+                'constant': {'rate': 10.0, 'publish': 'out', 'message': 'hello'},
                 'rare': {'period': 100.0, 'behaviour': 'parts:ticking'},
             },
             'on_start': 'parts:begin',
@@ -372,7 +373,7 @@ SYSTEM = {
                     'while_inactive': 'drop',
                 },
             },
-            'timers': {'tick': {'period': 0.05, 'behaviour': 'parts:ticking'}},
+            'timers': {'tick': {'period': 0.1, 'behaviour': 'parts:ticking'}},
             'on_activate': 'parts:end',
         },
         'user': {
@@ -402,7 +403,7 @@ PART = {
             'foreach': {'i': [1]},
             'parameters': {'size': '{{ size * i }}'},
             'publishers': {'turn': {'type': _STRING, 'topic': 'turns'}},
-            'timers': {'turn': {'period': 0.05, 'behaviour': 'peer:tick', 'publish': 'turn'}},
+            'timers': {'turn': {'period': 0.1, 'behaviour': 'peer:tick', 'publish': 'turn'}},
         },
         'hub': {
             'subscriptions': {

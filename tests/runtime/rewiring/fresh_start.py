@@ -19,6 +19,11 @@ from tests.running import ROOT
 
 _LENGTH = struct.Struct('!q')
 STOP_SEC = 60.0
+# What a start waits for is in the same system, unless it is nowhere.
+_WAIT_SEC = 10.0
+# Their libraries are loaded once.
+_MESSAGES = ('builtin_interfaces', 'rcl_interfaces', 'service_msgs', 'std_msgs')
+_MESSAGES = (*_MESSAGES, 'std_srvs', 'test_msgs', 'unique_identifier_msgs')
 
 
 class FreshStarter:
@@ -82,6 +87,7 @@ def running_system(paths, workers=None, *, checks=True):
     from composer.runtime.environment import environment_set
     from composer.runtime.logs import log_levels
     from composer.runtime.system import System
+    from tests.runtime.rewiring.inspections import create_parameter_services
 
     reader = SystemReader(paths, [], [])
     context = reader.check() if checks else _read(reader)
@@ -123,13 +129,6 @@ def _with_levels(snapshot):
         for key, node in snapshot.spec.nodes.items()
     }
     return replace(snapshot, spec=replace(snapshot.spec, nodes=nodes))
-
-
-def create_parameter_services(system):
-    """Create the parameter services that come in the background."""
-    system._parameter_services.stop()
-    for node in system._nodes.values():
-        node.ros.start_parameter_services()
 
 
 def _start_and_tell(paths, answers, *, checks):
@@ -178,9 +177,13 @@ def _import_all(paths):
     for name in (
         *('composer.cli.starting.reload', 'composer.runtime.run', 'composer.runtime.system'),
         *('std_msgs.msg', 'std_srvs.srv', 'test_msgs.action', 'diagnostic_msgs.msg'),
-        *('tests.runtime.rewiring.descriptions', 'tests.runtime.rewiring.observing'),
+        *('tests.runtime.rewiring.inspections', 'tests.runtime.rewiring.observing'),
+        *(f'{each}.{each}_s__rosidl_typesupport_c' for each in _MESSAGES),
     ):
         importlib.import_module(name)
+    importlib.import_module(
+        'composer.language.parsing.condition_parser'
+    ).DEFAULT_WAIT_SEC = _WAIT_SEC
     # What the check imports when it needs it.
     SystemReader(paths, [], []).check()
 

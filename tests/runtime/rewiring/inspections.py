@@ -2,18 +2,16 @@
 
 import random
 from contextlib import ExitStack
-from unittest import mock
 
 from rclpy.parameter import Parameter
 
 from composer.errors import StartError
 from composer.runtime.rewiring.node_changes import NodeChange
 from composer.runtime.rewiring.rewire import Rewiring
+from tests.runtime.rewiring.base_system import WITNESSES
 from tests.runtime.rewiring.descriptions import describe
-from tests.runtime.rewiring.fresh_start import create_parameter_services
 from tests.runtime.rewiring.memories import find_lost, remember
 from tests.runtime.rewiring.running import Runs
-from tests.runtime.rewiring.witness import WITNESSES
 
 # After steps of these a failure strikes.
 _STEPS = (
@@ -24,6 +22,13 @@ _STEPS = (
     (NodeChange, 'replace_record'),
 )
 FAULT = 'a fault of the game'
+
+
+def create_parameter_services(system):
+    """Create the parameter services that come in the background."""
+    system._parameter_services.stop()
+    for node in system._nodes.values():
+        node.ros.start_parameter_services()
 
 
 class Inspection:
@@ -93,8 +98,9 @@ class Inspection:
             return step
 
         for owner, name in _STEPS if number else ():
-            step = counting(getattr(owner, name))
-            self._patches.enter_context(mock.patch.object(owner, name, step))
+            original = getattr(owner, name)
+            self._patches.callback(setattr, owner, name, original)
+            setattr(owner, name, counting(original))
 
 
 class InspectionElsewhere:

@@ -1,31 +1,12 @@
-"""Whether all of a system runs that should, on the code that it should."""
+"""Whether all of a process runs that should, on the code that it should."""
 
-from time import monotonic, sleep
-
-from tests.running import DEADLINE_SEC
+from tests.runtime.rewiring.base_system import WITNESSES
 from tests.runtime.rewiring.descriptions import describe_bound, ros_of
-from tests.runtime.rewiring.witness import WITNESSES
 
 # Timers with longer periods are not waited for.
 _PROMPT_NS = 200_000_000
 # What the behaviours know of types.
 _TYPES = ('std_msgs/msg/String', 'std_srvs/srv/Trigger', 'test_msgs/action/Fibonacci')
-
-
-def check_runs(processes, observer, plan, told):
-    """Wait until each behaviour has run that should; actions only if the plan names them."""
-    touched = {each.target for each in plan.operations}
-    pending = [(each, each.begin_runs(touched)) for each in processes]
-    deadline = monotonic() + DEADLINE_SEC
-    while any(questions for _, questions in pending):
-        for process, questions in pending:
-            for question in questions.values():
-                _ask(observer, *question)
-            for key in process.find_ran(told) if questions else ():
-                del questions[key]
-        left = [[*questions] for _, questions in pending]
-        assert monotonic() < deadline, f'{told}: does not run: {left}'
-        sleep(0.002)
 
 
 class Runs:
@@ -84,16 +65,6 @@ def _question(node, section, spec):
         'actions': lambda: node.ros.resolve_action_name(spec.action),
     }.get(section, str)
     return section, resolve(), getattr(spec, 'type', None)
-
-
-def _ask(observer, section, name, type_name):
-    """Let a behaviour have what it waits for."""
-    if section == 'subscriptions':
-        observer.publish(name, type_name)
-    elif section == 'services':
-        observer.wait(observer.begin_call(name, type_name))
-    elif section == 'actions':
-        observer.wait(observer.send_goal(name, type_name, order=1))
 
 
 def _check_ran(ran, bound, told):

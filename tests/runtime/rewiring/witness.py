@@ -5,8 +5,6 @@ from rclpy.parameter import Parameter
 from tests.running import wait_for
 
 WITNESS = '/witness'
-# The second one tells it numbers from a worker.
-WITNESSES = (WITNESS, '/witness_afar')
 
 
 class Witness:
