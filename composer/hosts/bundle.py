@@ -41,6 +41,8 @@ class Bundle:
         named: All files that were read.
         words: The arguments of the command line that come after the files.
         read: The variables of the environment that the files read, and whether they are set here.
+        addresses: Where hosts look for others, by their names, if not at their addresses: these
+            may be names that only ssh here knows.
     """
 
     def __init__(
@@ -50,8 +52,9 @@ class Bundle:
         named: Iterable[Path],
         words: Sequence[str],
         read: Mapping[str, bool],
+        addresses: Mapping[str, str],
     ) -> None:
-        self._context, self._read = context, read
+        self._context, self._read, self._addresses = context, read, addresses
         # Modules come in wheels.
         modules = set(context.modules.list_files())
         others = [path for path in named if path not in modules]
@@ -74,7 +77,7 @@ class Bundle:
         return {host.name: self._build(host, facts[host.name]) for host in hosts}
 
     def _build(self, host: HostSpec, facts: Mapping[str, Any]) -> Part:
-        spec = self._context.spec.on_host(host.name)
+        spec = self._with_addresses(self._context.spec.on_host(host.name))
         # A copy asks for the part; what was read stays read.
         snapshot = take_snapshot(replace(self._context, spec=spec))
         python = facts['python']
@@ -99,6 +102,13 @@ class Bundle:
             read=self._read,
         )
         return build_part(sources, facts)
+
+    def _with_addresses(self, spec: SystemSpec) -> SystemSpec:
+        hosts = {
+            name: replace(host, address=self._addresses.get(name, host.address))
+            for name, host in spec.hosts.items()
+        }
+        return replace(spec, hosts=hosts)
 
 
 def choose_hosts(spec: SystemSpec, wanted: Sequence[str] = ()) -> list[HostSpec]:

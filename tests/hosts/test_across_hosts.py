@@ -52,6 +52,18 @@ def test_ps_does_not_take_a_part_that_cannot_be_asked_for_one_that_is_not_there(
     assert done.stderr == 'error: host front: the part runs, and does not answer\nno graph\n'
 
 
+def test_parts_are_asked_by_a_discovery_server_that_only_ssh_here_knows_by_its_name(project):
+    network = '{discovery: discovery_server, server: front, domain_id: 20}'
+    project.edit('robot.yaml', '{discovery: multicast, domain_id: 20}', network)
+    project.deploy()
+    project.hears('hello')
+    done = project.run('ps')
+    assert done.returncode == 0, done.stderr
+    project.edit('behaviours/listen.py', 'message.data)', "message.data + '!')")
+    assert 'rear: reload\n' in project.deploy().stdout
+    project.hears('hello!')
+
+
 def test_top_shows_the_entities_of_all_parts(project):
     done = project.run('top', '--format', 'json')
     assert done.returncode == 0, done.stderr

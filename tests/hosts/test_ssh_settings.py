@@ -80,15 +80,15 @@ def test_the_address_is_that_of_the_configuration(ssh):
 
 
 @pytest.mark.parametrize(
-    ('network', 'values'),
+    ('network', 'addresses'),
     [
-        ('multicast', []),
-        ('peers', ['hosts.front.address=10.0.0.2']),
-        ('{discovery: discovery_server, server: front}', ['hosts.front.address=10.0.0.2']),
-        ('{discovery: discovery_server, server: near}', []),
+        ('multicast', {}),
+        ('peers', {'front': '10.0.0.2'}),
+        ('{discovery: discovery_server, server: front}', {'front': '10.0.0.2'}),
+        ('{discovery: discovery_server, server: near}', {}),
     ],
 )
-def test_hosts_find_each_other_by_what_ssh_has_for_their_names(ssh, capsys, network, values):
+def test_hosts_find_each_other_by_what_ssh_has_for_their_names(ssh, capsys, network, addresses):
     (ssh / 'config').write_text('Host f\n  HostName 10.0.0.2\nHost n\n  HostName localhost\n')
     path = ssh / 'robot.yaml'
     path.write_text(
@@ -97,7 +97,7 @@ def test_hosts_find_each_other_by_what_ssh_has_for_their_names(ssh, capsys, netw
         'hosts: {front: {address: f}, near: {address: n}, unused: {address: f, user: x}}\n'
         'nodes: {a: {host: front}, b: {host: near}}\n'
     )
-    assert list(find_addresses(load_system(path).spec)) == values
+    assert find_addresses(load_system(path).spec) == addresses
     told = capsys.readouterr()[1]
     told_of_near = "warning: host near: 'n' is localhost for ssh here (HostName): all hosts must"
     assert (told_of_near in told) == (network != 'multicast' and 'server: front' not in network)

@@ -29,7 +29,7 @@ from composer.network.servers import list_sought, used_hosts
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterator, Sequence
+    from collections.abc import Coroutine, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
@@ -68,9 +68,11 @@ def deploy(
     chosen = choose_hosts(context.spec, hosts)
     if removes:
         return _run(_remove(context.spec, chosen, hosts, leave))
-    settings = [f'--set={each}' for each in (*set_values, *find_addresses(context.spec))]
+    addresses = find_addresses(context.spec)
+    looked_for = [f'hosts.{name}.address={address}' for name, address in addresses.items()]
+    settings = [f'--set={each}' for each in (*set_values, *looked_for)]
     read = choose_read(names)
-    bundle = Bundle(context, paths, list_files(context), [*words, *settings], read)
+    bundle = Bundle(context, paths, list_files(context), [*words, *settings], read, addresses)
     return _run(_deploy(context.spec, chosen, hosts, leave, bundle, only_plans=only_plans))
 
 
@@ -116,12 +118,13 @@ def _read(
     return None if has_errors(findings) else context
 
 
-def find_addresses(spec: SystemSpec) -> Iterator[str]:
-    """Yield values to set: addresses by which hosts find each other, where ssh has others.
+def find_addresses(spec: SystemSpec) -> dict[str, str]:
+    """Return the addresses by which hosts find each other, by name, where ssh has others.
 
     Raises:
         ComposerError: The configuration of ssh cannot be read.
     """
+    found = {}
     for host in list_sought(spec, used_hosts(spec)):
         address = find_real_address(host)
         if address == host.address:
@@ -131,7 +134,8 @@ def find_addresses(spec: SystemSpec) -> Iterator[str]:
             _tell(f"warning: {known}: all hosts must know it as '{host.address}'")
         else:
             _tell(f'{known}: the hosts find each other by that')
-            yield f'hosts.{host.name}.address={address}'
+            found[host.name] = address
+    return found
 
 
 async def _deploy(
