@@ -10,7 +10,7 @@ from composer.planning.snapshot_data import decode_snapshot
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from composer.hosts.host_parts import Part
     from composer.language.specs import HostSpec
@@ -66,7 +66,8 @@ def plan_host(part: Part, facts: Mapping[str, Any]) -> HostPlan:
     """Return what must be done on a host."""
     old = facts['manifest'] or {'files': {}, 'packages': []}
     new = part.manifest
-    changes = [*_compare_files(old, new), *_compare_packages(old, new)]
+    there = _without(old, facts['missing'])
+    changes = [*_compare_files(there, new), *_compare_packages(old, new)]
     changes += [('+', f'interface package {name}') for name in _added(old, new, 'interfaces')]
     if old.get('composer') != new['composer']:
         changes.append(('~' if facts['manifest'] else '+', 'Composer'))
@@ -76,7 +77,7 @@ def plan_host(part: Part, facts: Mapping[str, Any]) -> HostPlan:
     blobs = tuple(digest for digest in part.blobs if digest not in known)
     has_venv = new['venv'] in facts['venvs']
     wheels = () if has_venv else tuple(each for each in part.wheels if each not in facts['wheels'])
-    action, reason = _decide(old, part, facts, has_changes=bool(changes))
+    action, reason = _decide(old, part, facts, has_changes=bool(changes or facts['missing']))
     has_composer = new['composer'] in facts['composers']
     runs, is_to_run = frozenset(old.get('runs', ())), frozenset(new['runs'])
     return HostPlan(
@@ -121,6 +122,15 @@ def _compare_files(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[t
             yield '-', name
         elif before[name] != after[name]:
             yield '~', name
+
+
+def _without(manifest: Mapping[str, Any], missing: Collection[str]) -> dict[str, Any]:
+    """Return what a host has of a release of which somebody has removed files."""
+    kept = {
+        key: {name: each for name, each in manifest.get(key, {}).items() if name not in missing}
+        for key in ('files', 'contents')
+    }
+    return {**manifest, **kept}
 
 
 def _contents(manifest: Mapping[str, Any]) -> dict[str, Any]:
@@ -216,8 +226,8 @@ def find_space_problem(plan: HostPlan, facts: Mapping[str, Any]) -> str | None:
     if needed <= free:
         return None
     return (
-        f'host {plan.part.host.name}: {facts["folder"]} needs {needed / _MEGABYTE:.0f} MB, '
-        f'and its disk has {free / _MEGABYTE:.0f} MB'
+        f'host {plan.part.host.name}: {facts["folder"]} needs {_format_bytes(needed)}, '
+        f'and its disk has {_format_bytes(free)}'
     )
 
 

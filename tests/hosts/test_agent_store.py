@@ -1,5 +1,6 @@
 """What a host keeps of a system: releases, and the files that run."""
 
+import fcntl
 import hashlib
 
 import pytest
@@ -54,6 +55,24 @@ def test_what_was_edited_is_found(store):
     (store.live / 'a').write_bytes(b'mine')
     (store.live / 'b').unlink()
     assert store.list_edited() == {'a': hashlib.sha256(b'mine').hexdigest()}
+    assert store.list_missing() == ['b']
+
+
+@pytest.mark.parametrize(
+    ('owner', 'told'),
+    [
+        ('me (process 7)', "'robot' is being deployed here by another name of this host"),
+        ('you (process 7)', r"'robot' is being deployed by me \(process 7\), since "),
+    ],
+)
+def test_a_deployment_that_meets_itself_is_no_other_one(store, tmp_path, owner, told):
+    path = tmp_path / 'locks' / 'robot'
+    path.parent.mkdir()
+    path.write_text('me (process 7), since 10:00:00')
+    with path.open() as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        with pytest.raises(HostError, match=told):
+            store.lock(owner)
 
 
 def test_a_file_that_has_not_come_whole_is_not_staged(store):

@@ -25,7 +25,15 @@ def test_a_file_that_was_edited_there_is_not_overwritten(project):
     told = project.fail()
     assert told.splitlines()[0] == f'error: host front: {edited} was edited there'
     assert project.states() == before
+    # Who removes it, as the help says, gets what the files here have.
+    project.front.run('rm', edited)
+    project.edit('behaviours/talk.py', 'hey', 'hello')
+    assert '  + behaviours/talk.py' in project.deploy().stdout
+    project.hears('hello')
+    assert project.deploy('--plan').stdout == 'front: nothing to do\nrear: nothing to do\n'
     # Who takes the edit over deploys it.
+    project.front.run('sed', '-i', 's/hello/good day/', edited)
+    project.edit('behaviours/talk.py', 'hello', 'hey')
     project.edit('behaviours/talk.py', 'hey', 'good day')
     project.deploy()
     project.hears('good day')
@@ -76,7 +84,7 @@ def test_a_unit_of_somebody_else_is_not_overwritten(project):
         },
         {'front.systemd=system': "for root, and the user of 'front' is not named"},
         {'front.folder=/home/robot/still/mine': "no program may be run from '/home/robot/still/"},
-        {'front.folder=/home/robot/small': 'its disk has 21 MB'},
+        {'front.folder=/home/robot/small': 'its disk has 21.0 MB'},
         {'front.folder=/home/robot/narrow': 'host front: the disk is full'},
     ],
     ids=lambda lacks: ' '.join(each.partition('=')[0] for each in lacks),

@@ -8,7 +8,7 @@ from composer.checks.checker import check_in_context, create_context
 from composer.cli.common.system_reader import list_files
 from composer.diagnostics import has_errors
 from composer.hosts.host_parts import PartSources, build_part
-from composer.hosts.host_plan import plan_host
+from composer.hosts.host_plan import find_space_problem, plan_host
 from composer.hosts.project_files import collect_files
 from composer.hosts.wheels import Wheel
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -45,6 +45,7 @@ FACTS = {
     'root': '/f/systems/robot',
     'hold': '/run/hold',
     'edited': {},
+    'missing': [],
     'venvs': [],
     'wheels': [],
     'composers': [],
@@ -94,13 +95,14 @@ def part_of_front(folder):
     return build_part(sources, FACTS)
 
 
-def plan_after(folder, name, old, new):
+def plan_after(folder, name, old, new, **more):
     before = part_of_front(folder)
     path = folder / name
     path.write_text(path.read_text().replace(old, new))
     # As a host keeps it.
     manifest = json.loads(json.dumps(before.manifest))
-    return plan_host(part_of_front(folder), {**FACTS, 'manifest': manifest, 'unit': before.unit})
+    facts = {**FACTS, 'manifest': manifest, 'unit': before.unit, **more}
+    return plan_host(part_of_front(folder), facts)
 
 
 @pytest.fixture
@@ -126,3 +128,16 @@ def test_an_edit_of_the_inventory_alone_is_no_restart(folder, case):
     name, old, new, action, reason = OF_MULTICAST[case]
     plan = plan_after(folder, name, old, new)
     assert (plan.action, plan.reason) == (action, reason)
+
+
+def test_a_file_that_somebody_has_removed_there_is_brought_again(folder):
+    plan = plan_after(folder, 'robot.yaml', '', '', missing=['files/robot.yaml'])
+    assert (plan.action, plan.changes) == ('reload', (('+', 'robot.yaml'),))
+
+
+def test_a_disk_that_is_full_has_no_round_numbers(folder):
+    plan = plan_after(folder, 'robot.yaml', '/chatter', '/talk')
+    said = find_space_problem(plan, {**FACTS, 'free_bytes': 100})
+    assert (
+        said == f'host front: /f needs {plan.needed_bytes / 1000:.1f} kB, and its disk has 0.1 kB'
+    )

@@ -40,6 +40,7 @@ def collect_facts(store: Store, service: Service, transaction: Transaction) -> d
         'is_foreign': manifest is None and store.root.exists() and not _is_own(store),
         'is_pending': transaction.is_pending,
         'edited': store.list_edited(),
+        'missing': store.list_missing(),
         'wheels': [path.name for path in (store.folder / 'wheels').glob('*.whl')],
         'venvs': [path.parent.name for path in (store.folder / 'venvs').glob('*/ready')],
         'composers': [path.name for path in (store.folder / 'composer').glob('*')],

@@ -40,6 +40,10 @@ from composer.hosts.agent.host_errors import HostError, run
 _KEPT = 2
 _NEW_SEC = 3600.0
 _MANIFEST = 'manifest.json'
+_TWO_NAMES = (
+    'use one name for a host, or give each another folder; if it has got a new name, remove '
+    "it by the old one first: 'composer deploy … --remove' with the files that have that name"
+)
 # What of the folder of a system is not of others.
 _BROUGHT = ('releases', 'current', 'pending', 'incoming', 'start', 'before.json')
 
@@ -78,9 +82,12 @@ class Store:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             stream.seek(0)
-            owner = stream.read() or 'another'
+            holder = stream.read() or 'another'
             stream.close()
-            message = f"'{self.system}' is being deployed by {owner}"
+            if holder.startswith(f'{owner}, '):
+                message = f"'{self.system}' is being deployed here by another name of this host"
+                raise HostError(message, _TWO_NAMES) from error
+            message = f"'{self.system}' is being deployed by {holder}"
             raise HostError(message, 'wait until that has ended') from error
         stream.truncate(0)
         stream.write(f'{owner}, since {time.strftime("%H:%M:%S")}')
@@ -110,6 +117,11 @@ class Store:
             for name, found in now.items()
             if found is not None and found != given[name]
         }
+
+    def list_missing(self) -> list[str]:
+        """Return the files that were written here and are not there any more."""
+        given = _list_digests(self.manifest())
+        return [name for name in given if not (self.live / name).exists()]
 
     def keep_others(self) -> list[Path]:
         """Move what others have written beside what was brought to `edited`; return where to."""
