@@ -53,11 +53,13 @@ class Measured:
         entities: Those with figures.
         cores: How many processor cores it may use there; `None` if that was not told.
         sizes: The mean size of messages in bytes, by the full names of topics, where it is known.
+        others: How many of the cores other programs used; 0 if that is not known.
     """
 
     entities: tuple[EntityFigures, ...]
     cores: int | None
     sizes: Mapping[str, float]
+    others: float = 0.0
 
 
 class Averages:

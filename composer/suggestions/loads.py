@@ -9,6 +9,9 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+# Whoever waits for a core gets some of it.
+_LEAST_CORES = 0.1
+
 
 @record
 class NodeLoad:
@@ -63,6 +66,7 @@ class SystemLoad:
         together: Groups of nodes that must be in one process, by full names.
         fixed: Nodes that must stay where they are.
         taken: Names that new workers must not have.
+        others: How many of the cores other programs use; 0 if that is not known.
     """
 
     nodes: Sequence[NodeLoad]
@@ -72,6 +76,13 @@ class SystemLoad:
     together: Sequence[frozenset[str]] = ()
     fixed: frozenset[str] = frozenset()
     taken: frozenset[str] = frozenset()
+    others: float = 0.0
+
+    @property
+    def free_cores(self) -> float:
+        """How many cores are left to the system: no fewer than it used."""
+        used = sum(node.cpu for node in self.nodes)
+        return min(self.cores, max(self.cores - self.others, used, _LEAST_CORES))
 
     @property
     def present(self) -> Mapping[str, str]:

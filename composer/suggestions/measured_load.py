@@ -66,6 +66,7 @@ def build_load(
         together=sorted(set(_find_sharing(context, spec)), key=sorted),
         fixed=fixed,
         taken=frozenset(spec.workers),
+        others=measured.others,
     )
 
 

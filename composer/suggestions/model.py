@@ -57,7 +57,7 @@ def cost_of(load: SystemLoad, split: Split) -> Cost:
     cpu = max(0.0, sum(node.cpu for node in load.nodes) + crossing)
     # A node's own callbacks mostly exclude each other.
     longest = max((node.cpu for node in load.nodes), default=0.0)
-    busiest = max(*gil.values(), cpu / load.cores, min(longest, 1.0)) if gil else 0.0
+    busiest = max(*gil.values(), cpu / load.free_cores, min(longest, 1.0)) if gil else 0.0
     return Cost(busiest, cpu, crossing, gil)
 
 

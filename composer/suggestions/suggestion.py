@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 # Less may be noise, and a process more is a process more.
 LEAST_GAIN = 1.1
 _ALMOST = 0.9
+# Less is what runs on every computer.
+_FEW_CORES = 0.1
 
 
 @record
@@ -79,14 +81,20 @@ def _explain_none(load: SystemLoad, before: Cost, split: Split) -> str:
     if len(load.nodes) - len(load.fixed) < 1:
         return 'no node can be moved'
     largest = max(load.nodes, key=lambda each: (each.cpu, each.name))
-    if before.cpu >= _ALMOST * load.cores:
-        return f'all {_cores(load.cores)} are used already ({before.cpu:.1f})'
+    if before.cpu >= _ALMOST * load.free_cores:
+        others = f', and {load.others:.1f} by other programs' if tells_others(load) else ''
+        return f'all {_cores(load.cores)} are used already ({before.cpu:.1f}{others})'
     if largest.cpu >= _ALMOST:
         return f'{largest.name} alone needs a core ({largest.cpu:.0%}), wherever it runs'
     crossing = cost_of(load, split).crossing
     if crossing > 0 and split != load.present:
         return f'messages between processes would cost what is won ({crossing:.0%} of a core)'
     return 'what is busy would be as busy in processes of its own'
+
+
+def tells_others(load: SystemLoad) -> bool:
+    """Return whether other programs use so much that it should be said."""
+    return load.others >= _FEW_CORES
 
 
 def _cores(count: int) -> str:

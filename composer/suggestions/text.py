@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from composer.suggestions.suggestion import tells_others
 from composer.terminal import escape
 from composer.yaml_text.writer import render_yaml
 
@@ -48,7 +49,7 @@ def _summary(suggestion: Suggestion, system: str) -> str:
     used = suggestion.after.cpu * suggestion.gain
     return (
         f'{system}: {suggestion.before.cpu:.1f} of {suggestion.load.cores} cores used → '
-        f'{min(used, suggestion.load.cores):.1f}, expected {suggestion.gain:.1f}x'
+        f'{min(used, suggestion.load.free_cores):.1f}, expected {suggestion.gain:.1f}x'
     )
 
 
@@ -70,6 +71,8 @@ def _table(suggestion: Suggestion) -> list[str]:
         )
         what = f'worker {worker}' if worker else _MAIN
         lines.append(f'  {what}: {", ".join(filter(None, parts))}')
+    if tells_others(load):
+        lines.append(f'  other programs use {load.others:.1f} of {load.cores} cores')
     guessed = ', '.join(node.name for node in load.nodes if not node.is_gil_known)
     if guessed:
         lines.append(f'  the GIL of these is not known, and taken to be their CPU: {guessed}')
@@ -87,6 +90,7 @@ def render_json(suggestion: Suggestion, system: str, keys: Mapping[str, str]) ->
         'version': 1,
         'name': system,
         'cores': load.cores,
+        'other_programs': load.others,
         'demand': None if load.demand == float('inf') else load.demand,
         'gain': suggestion.gain,
         'reason': suggestion.reason,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
+from socket import gethostname
 from typing import TYPE_CHECKING
 
 import click
@@ -19,6 +21,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
 from composer.suggestions.figures import Measured, average_answers, read_recorded
 from composer.suggestions.measured_load import build_load
+from composer.suggestions.other_programs import cores_of_others, read_processors
 from composer.suggestions.suggestion import suggest_split
 from composer.suggestions.text import render_json, render_layer, render_text
 from composer.yaml_text.writer import render_yaml
@@ -87,6 +90,9 @@ def suggest(
     keys = {node.full_name: key for key, node in spec.nodes.items()}
     movable = _find_movable(load, system.spec, keys.values())
     fixed = frozenset(name for name, key in keys.items() if key not in movable)
+    if options.cores:
+        # Who else uses those is not known.
+        measured = replace(measured, others=0.0)
     cores = options.cores or measured.cores or os.cpu_count() or 1
     suggestion = suggest_split(build_load(context, spec, measured, cores, fixed))
     _tell(suggestion, spec.name, keys, paths, options)
@@ -122,6 +128,8 @@ def _watch(name: str, seconds: float) -> Measured:
     answers = {}
     with Client() as client:
         system = Discovery(client).find(name)
+        is_here = (system.status or {}).get('host') == gethostname()
+        before, began, own_sec = read_processors(), time.monotonic(), time.process_time()
         with client.asking(system, protocol.TOP) as ask:
             deadline = time.monotonic() + seconds
             while True:
@@ -136,12 +144,17 @@ def _watch(name: str, seconds: float) -> Measured:
                 if time.monotonic() >= deadline + STATUS_SEC + 3 * answer['period_sec']:
                     break
                 time.sleep(min(_POLL_SEC, answer['period_sec'] / 2))
+        after, elapsed_sec = read_processors(), time.monotonic() - began
+        own_sec = time.process_time() - own_sec
     entities = average_answers(answers.values())
     if not entities:
         message = f"system '{name}' does not say what its calls cost"
         raise ComposerError(message, help='its interpreter cannot be watched: see docs/running.md')
-    cores = [each['cores'] for answer in answers.values() for each in answer['processes']]
-    return Measured(entities, max(cores, default=None), {})
+    processes = [each for answer in answers.values() for each in answer['processes']]
+    cores = max((each['cores'] for each in processes), default=None)
+    used = sum(each['cpu'] or 0.0 for each in processes) / len(answers) + own_sec / elapsed_sec
+    others = cores_of_others(before, after, used, cores) if is_here and cores else 0.0
+    return Measured(entities, cores, {}, others)
 
 
 def _find_movable(
