@@ -20,7 +20,7 @@ from tests.running import ROOT
 _LENGTH = struct.Struct('!q')
 STOP_SEC = 60.0
 # What a start waits for is in the same system, unless it is nowhere.
-_WAIT_SEC = 10.0
+_WAIT_SEC = 5.0
 # Their libraries are loaded once.
 _MESSAGES = ('builtin_interfaces', 'rcl_interfaces', 'service_msgs', 'std_msgs')
 _MESSAGES = (*_MESSAGES, 'std_srvs', 'test_msgs', 'unique_identifier_msgs')

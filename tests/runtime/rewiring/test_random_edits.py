@@ -23,9 +23,9 @@ pytestmark = pytest.mark.ros
 
 def test_edits(tmp_path, domain_id, other_domain_id):
     with playing(tmp_path, 1, (domain_id, other_domain_id)) as game:
-        for _ in range(35):
+        for _ in range(50):
             game.play()
-    assert game.applied > 8
+    assert game.applied > 15
 
 
 def test_each_key_of_the_schema_is_edited(tmp_path):
