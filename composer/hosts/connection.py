@@ -212,6 +212,9 @@ def _unreachable(host: HostSpec, error: Exception) -> HostConnectionError:
     reason = str(error) or 'no answer'
     if isinstance(error, TimeoutError):
         reason = f'no answer within {_CONNECT_SEC:g} s'
+    elif isinstance(error, OSError) and (number := error.errno or 0) > 0:
+        # That of asyncio has the call and its arguments. Failed look-ups have negative numbers.
+        reason = os.strerror(number)
     message = f'host {host.name} ({host.address}) cannot be reached: {reason}'
     return HostConnectionError(message)
 

@@ -1,5 +1,6 @@
 """Keys and addresses are those that ssh would use."""
 
+import socket
 from types import SimpleNamespace
 
 import pytest
@@ -66,6 +67,20 @@ def test_a_key_that_others_can_read_is_not_used(ssh, case):
         found = connection._without_open_keys(one, options)
         keys = None if expected is None else [str(ssh / each) for each in expected]
         assert found.get('client_keys') == keys
+
+
+@pytest.mark.parametrize(
+    ('error', 'reason'),
+    [
+        (OSError(111, "Connect call failed ('10.0.0.2', 22)"), 'Connection refused'),
+        (socket.gaierror(-2, 'Name or service not known'), '[Errno -2] Name or service not known'),
+        (OSError('Multiple exceptions: a, b'), 'Multiple exceptions: a, b'),
+        (TimeoutError(), 'no answer within 10 s'),
+    ],
+)
+def test_why_a_host_cannot_be_reached_is_said_in_words(error, reason):
+    said = str(connection._unreachable(host(), error))
+    assert said == f'host rear (rear) cannot be reached: {reason}'
 
 
 def test_the_address_is_that_of_the_configuration(ssh):
