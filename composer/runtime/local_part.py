@@ -34,7 +34,7 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import find_hidden
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
     from rclpy.context import Context
 
@@ -275,6 +275,18 @@ class LocalPart:
     def list_hidden(self) -> frozenset[str]:
         """Return the full names of the nodes of this process that have not started."""
         return find_hidden(self._nodes)
+
+    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
+        """End the calls and goals that wait for servers of a process that has gone.
+
+        Args:
+            lost: The names that nobody serves any more, by the section of their clients.
+        """
+        for node in list(self._nodes.values()):
+            for section, names in lost.items():
+                clients: dict[str, Any] = node.entities.get(section, {})
+                for client in list(clients.values()):
+                    client.lose_server(names)
 
     def list_components(self) -> list[str]:
         """Return the full names of the components that are loaded into its containers."""

@@ -52,8 +52,14 @@ class Requests:
     def end(self, error: ComposerError) -> None:
         """End all requests with an error, as their client goes."""
         self.ended.append(error)
+        self.fail(error)
+
+    def fail(self, error: ComposerError) -> None:
+        """End all requests that wait for an answer with an error, as their server has gone."""
         for future in list(self.waiting):
-            future.set_exception(error)
+            if not future.done():
+                self.forget(future)
+                future.set_exception(error)
 
     def send(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
         """Send a request and return its answer.

@@ -27,6 +27,8 @@ from composer.runtime.nodes.goals import Goal
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
@@ -100,11 +102,22 @@ class ActionClient:
         self._node.at_destruction.remove(self._client.destroy)
         error = ActionNotAvailableError(f"an edit took the action client of '{self._name}' away")
         self._requests.end(error)
-        for goal in list(self._goals):
-            goal.lose(error)
+        self._lose_goals(error)
         self._node.system.services.remove(self._local)
         self._client.destroy()
         self._behaviours.destroy()
+
+    def lose_server(self, names: Container[str]) -> None:
+        """End the goals that were sent or accepted, if the server is one of these."""
+        if self._name in names:
+            message = f"the action server '{self._name}' ended before the goal did"
+            error = ActionNotAvailableError(message)
+            self._requests.fail(error)
+            self._lose_goals(error)
+
+    def _lose_goals(self, error: ActionNotAvailableError) -> None:
+        for goal in list(self._goals):
+            goal.lose(error)
 
     def _unavailable(self, timeout_sec: float) -> ActionNotAvailableError:
         message = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"

@@ -19,6 +19,8 @@ from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from rclpy.task import Future
 
     from composer.language.specs import Introspection, ServiceClientSpec
@@ -110,6 +112,12 @@ class ServiceClient:
         self._requests.end(ServiceNotAvailableError(message))
         self._node.system.services.remove(self._local)
         self._node.ros.destroy_client(self._client)
+
+    def lose_server(self, names: Container[str]) -> None:
+        """End the calls that wait for an answer, if the server is one of these."""
+        if self._service in names:
+            message = f"the server of '{self._service}' ended before it answered"
+            self._requests.fail(ServiceNotAvailableError(message))
 
     def _unavailable(self, timeout_sec: float) -> CallError:
         message = f"no server of '{self._service}' appeared within {timeout_sec:g} s"

@@ -28,13 +28,31 @@ _MOST = 5
 
 def describe_losses(spec: SystemSpec, worker: str) -> str:
     """Return in words which nodes go with a worker, and what the others do not have then."""
-    gone = [node for node in spec.nodes.values() if node.worker == worker]
+    gone, left = _split(spec, worker)
     names = {node.full_name for node in gone}
-    left = [node for node in spec.end_owners() if node.full_name not in names]
     nodes = 'its node is' if len(names) == 1 else f'its {len(names)} nodes are'
     text = f'{nodes} gone: {_list(sorted(names))}'
     lines = list(_describe_ends(gone, left))
     return '\n'.join([text, *(f'  {line}' for line in lines)])
+
+
+def find_lost_servers(spec: SystemSpec, worker: str) -> dict[str, frozenset[str]]:
+    """Return the names that only nodes of a worker serve, by the section of their clients."""
+    gone, left = _split(spec, worker)
+    return {
+        taking: frozenset(_channels(gone, giving) - _channels(left, giving))
+        for giving, (taking, _) in _GIVEN.items()
+        if giving != 'publishers'
+    }
+
+
+def _split(
+    spec: SystemSpec, worker: str
+) -> tuple[list[NodeSpec], list[NodeSpec | DeclaredNodeSpec]]:
+    """Return the nodes of a worker, and all others."""
+    gone = [node for node in spec.nodes.values() if node.worker == worker]
+    names = {node.full_name for node in gone}
+    return gone, [node for node in spec.end_owners() if node.full_name not in names]
 
 
 def _describe_ends(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from composer.errors import ComposerError, ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Container, Iterator, Mapping
     from contextlib import AbstractContextManager
 
     from composer.language.specs import ProcessState
@@ -31,6 +31,9 @@ class SystemOfWorkers(Protocol):
 
     def list_hidden(self) -> frozenset[str]:
         """Return the full names of its nodes that have not started."""
+
+    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
+        """End what waits for servers of a worker that has gone."""
 
 
 class SystemCalls:
@@ -79,6 +82,11 @@ class SystemCalls:
         """End the system with an exit code."""
         if self.system is not None:
             self.system.request_stop(code)
+
+    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
+        """End what waits in the system's process for servers of a worker that has gone."""
+        if self.system is not None:
+            self.system.lose_servers(lost)
 
     def list_hidden(self) -> frozenset[str]:
         """Return the nodes of the system's process that have not started."""

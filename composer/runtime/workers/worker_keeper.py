@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import threading
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, cast
 
 from composer.errors import ComposerError, ExitCode
 from composer.processes.worker_supervisor import WorkerSupervisor
-from composer.runtime.workers.losses import describe_losses
+from composer.runtime.workers.losses import describe_losses, find_lost_servers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.language.specs import SystemSpec
     from composer.processes.external_process import ExternalProcess
@@ -39,6 +40,7 @@ class WorkerKeeper:
     Args:
         list_workers: Returns those that there are.
         end_system: Ends the system with an exit code.
+        lose_servers: Ends what waits in this process for servers that are lost.
 
     Attributes:
         supervisor: Runs their processes.
@@ -48,7 +50,10 @@ class WorkerKeeper:
     """
 
     def __init__(
-        self, list_workers: Callable[[], Iterable[Worker]], end_system: Callable[[int], None]
+        self,
+        list_workers: Callable[[], Iterable[Worker]],
+        end_system: Callable[[int], None],
+        lose_servers: Callable[[Mapping[str, frozenset[str]]], None],
     ) -> None:
         self.log = cast('EscapingLogger', _LazyLogger())
         self.supervisor = WorkerSupervisor(self.log, end_system, KILL_SEC)
@@ -59,6 +64,7 @@ class WorkerKeeper:
         self.is_stopping = False
         self._list_workers = list_workers
         self._end_system = end_system
+        self._lose_servers = lose_servers
         # Held while a worker is started again, or the system edited.
         self._lock = threading.Lock()
         self._restarting: Worker | None = None
@@ -106,7 +112,17 @@ class WorkerKeeper:
         worker = self._worker_of(process)
         if worker is not None and worker.is_up and self.spec is not None:
             name = worker.name
+            self._end_calls(find_lost_servers(self.spec, name))
             self.log.error(f"worker '{name}' has ended; {describe_losses(self.spec, name)}")
+
+    def _end_calls(self, lost: Mapping[str, frozenset[str]]) -> None:
+        """End the calls of all that are left to servers that are lost: DDS needs 20 s for that."""
+        ended = time.monotonic()
+        for worker in self._list_workers():
+            if worker.is_alive and worker.is_up:
+                with suppress(ComposerError):
+                    worker.channel.tell('lose_servers', lost, ended)
+        self._lose_servers(lost)
 
     def _act_on_end(self, process: ExternalProcess, code: int) -> None:
         worker = self._worker_of(process)

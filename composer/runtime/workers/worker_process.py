@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 from contextlib import ExitStack, suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 _BY_SIGNAL = 128
 _LONGEST_EXIT_SEC = 10.0
 _POLL_SEC = 0.5
+_LATEST_LOSS_SEC = 1.0
 # Those of the system.
 _cpus_before = os.sched_getaffinity(0)
 _nice_before = os.getpriority(os.PRIO_PROCESS, 0)
@@ -84,6 +86,7 @@ class WorkerProcess:
             *(self.create, self.run_on_start),
             *(self.open, self.start_waiting, self.be_up, self.stop),
             *(self.ping, self.status, self.top, self.restart_node, self.find_hidden),
+            self.lose_servers,
             *(self.begin_edit, self.wait_for_goals, self.make_way, self.apply_edit),
             *(self.commit_edit, self.undo_edit, self.follow),
         )
@@ -241,6 +244,16 @@ class WorkerProcess:
     def find_hidden(self) -> frozenset[str]:
         """Return the full names of the nodes that have not started."""
         return self._running.list_hidden()
+
+    def lose_servers(self, lost: Mapping[str, frozenset[str]], ended: float) -> None:
+        """End what waits for servers of a worker that has gone.
+
+        Args:
+            lost: See `LocalPart.lose_servers`.
+            ended: When it has gone, by `time.monotonic`. Long after, others may serve already.
+        """
+        if monotonic() - ended < _LATEST_LOSS_SEC:
+            self._running.lose_servers(lost)
 
     def begin_edit(self, snapshot: Snapshot) -> None:
         """Begin an edit; all that was imported last is part of it."""
