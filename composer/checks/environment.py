@@ -86,7 +86,7 @@ def _check_worker(context: CheckContext, worker: WorkerSpec) -> Iterator[Diagnos
     """Check the variables of a worker, in which the rest of the system must find its nodes."""
     for name in worker.environment:
         yield from _check_variable(context, (*worker.path, 'environment', name))
-    problems = [*_find_bad_values(worker.environment)]
+    problems = [*find_environment_problems(worker.environment)]
     domain = worker.environment.get('ROS_DOMAIN_ID')
     if not problems and domain and domain != context.spec.environment.get('ROS_DOMAIN_ID'):
         message = 'a worker in another ROS domain than the system sees nothing of it'

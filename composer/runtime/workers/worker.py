@@ -103,7 +103,7 @@ class Worker:
         try:
             result = self.call(step, *arguments)
         except ChannelLostError as error:
-            raise StartError(self.describe_failed_start()) from error
+            raise StartError(self.describe_failed_start(), help=self._advise(step)) from error
         if step == 'create':
             self.process.mark = result
         return result
@@ -211,6 +211,13 @@ class Worker:
             'restarts': self.process.restarts,
             'nodes': self.nodes,
         }
+
+    def _advise(self, step: str) -> str | None:
+        """Return what may have ended its process in its first step."""
+        names = ', '.join(map(repr, self.spec.environment))
+        if not names or step != 'import_behaviours':
+            return None
+        return f"do Python and ROS start with the 'environment' of the worker, which sets {names}?"
 
     def describe_failed_start(self) -> str:
         """Return in words that its process has ended while it started."""

@@ -310,6 +310,9 @@ def limit_processor(spec: WorkerSpec) -> None:
     Raises:
         StartError: This machine has no such cores, or the niceness needs privileges.
     """
+    # Linux itself leaves out cores that there are not, as long as there is one.
+    if not _cpus_before.issuperset(spec.cpus):
+        raise _no_such_cores(spec)
     try:
         # Linux has both for each thread; new ones have those of the thread that starts them.
         for thread in map(int, os.listdir('/proc/self/task')):  # noqa: PTH208 - numbers
@@ -319,11 +322,14 @@ def limit_processor(spec: WorkerSpec) -> None:
                 os.setpriority(os.PRIO_PROCESS, thread, _nice_before + (spec.nice or 0))
     except OSError as error:
         if error.errno == errno.EINVAL:
-            message = f"worker '{spec.name}' cannot have cpus {list(spec.cpus)}"
-            advice = f'the cores that there are for it: {sorted(_cpus_before)}'
-            raise StartError(message, help=advice) from error
+            raise _no_such_cores(spec) from error
         message = f"worker '{spec.name}' cannot have nice {spec.nice}: {error.strerror}"
         raise StartError(message) from error
+
+
+def _no_such_cores(spec: WorkerSpec) -> StartError:
+    message = f"worker '{spec.name}' cannot have cpus {list(spec.cpus)}"
+    return StartError(message, help=f'the cores that there are for it: {sorted(_cpus_before)}')
 
 
 def _portable(signature: inspect.Signature | None) -> inspect.Signature | None:

@@ -55,13 +55,13 @@ def test_no_on_start_runs_before_all_nodes_of_all_workers_exist(compose):
                 'talker': node('left', *TALKS),
                 'late': node('right', *HEARS),
             },
-            'workers: {right: {cpus: [1023]}}\n',
+            'workers: {right: {cpus: [0, 1023]}}\n',
         ),
         CODE,
     )
     assert child.wait() == 1
     assert 'begins' not in child.output
-    assert child.matching("error: worker 'right' cannot have cpus [1023]")
+    assert child.matching("error: worker 'right' cannot have cpus [0, 1023]")
     assert child.matching('help: the cores that there are for it: [0')
 
 
@@ -99,6 +99,17 @@ def test_an_on_start_in_a_worker_that_does_not_end_well_ends_the_start(
     assert child.matching('good ends in')
     assert child.matching('home ends in')
     wait_until_gone([good])
+
+
+def test_a_worker_whose_environment_keeps_python_from_starting_is_told_of(compose):
+    workers = 'workers: {left: {environment: {PYTHONHOME: /nowhere}}}\n'
+    child = compose(system({'good': node('left', *HEARS)}, workers), CODE)
+    assert child.wait() == 1
+    assert child.lines[-2:] == [
+        "error: worker 'left' has ended with exit code 1 while it started",
+        "  help: do Python and ROS start with the 'environment' of the worker, which sets "
+        "'PYTHONHOME'?",
+    ]
 
 
 def test_errors_in_modules_of_a_worker_are_findings_before_anything_starts(compose):
