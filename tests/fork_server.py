@@ -1,10 +1,9 @@
 """Starts `python -m composer` by a fork of a process that has imported what each start imports.
 
-Imports are most of the work of a start, and tests start Composer hundreds of times. What is forked
-has imported all that a system needs, and has begun nothing: ROS reads its environment when a
-context is made, but for the variables that `_READ_ONCE` names. All else is as in a new process:
-the command line, the folder, the environment, the descriptors, the ignored signals, and how it
-exits.
+Imports are half of the work of a start, and tests start Composer hundreds of times. What is forked
+has imported nothing of ROS, which reads its environment when it is imported, and nothing of
+Composer that minds forks: that is left to the child. All else is as in a new process: the command
+line, the folder, the environment, the descriptors, the ignored signals, and how it exits.
 """
 
 import gc
@@ -20,28 +19,18 @@ import subprocess
 import sys
 from contextlib import suppress
 from functools import cache
-from importlib.util import find_spec
 
 # What ends a process; a child ignores it if the process that asks does.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 # Variables that Python and libraries read once, when they start.
 _READ_ONCE = ('PYTHON', 'LANG', 'LC_', 'LD_', 'OMP_', 'OPENBLAS_', 'NPY_')
-_READ_ONCE = (*_READ_ONCE, 'ROS_PYTHON_', 'RMW_IMPLEMENTATION', 'RCL_ASSERT_', 'LTTNG_')
+# What these import in turn is none of ROS.
 _IMPORTED = (
     'composer.checks.checker',
     'composer.cli.main',
-    'composer.cli.starting.up',
     'composer.cli.starting.reload',
     'numpy',
 )
-_IMPORTED_OF_ROS = (
-    'composer.runtime.behaviours.import_check',
-    'composer.runtime.rewiring.reading',
-    'composer.runtime.run',
-    'rosidl_generator_py',
-)
-# A system has messages of these, by whatever behaviours it has.
-_MESSAGES = ('builtin_interfaces', 'diagnostic_msgs', 'rcl_interfaces', 'service_msgs', 'std_msgs')
 # The folder of the server stands in its search path for that of a child.
 _FOLDER = '/'
 _MAX_BYTES = 1 << 17
@@ -130,19 +119,6 @@ class ForkedProcess:
         return self.returncode
 
 
-def _import_all():
-    """Import what each start imports."""
-    for name in _IMPORTED:
-        importlib.import_module(name)
-    if find_spec('rclpy') is None:
-        return
-    for name in _IMPORTED_OF_ROS:
-        importlib.import_module(name)
-    for package in _MESSAGES:
-        importlib.import_module(f'{package}.msg')
-        importlib.import_module(f'{package}.{package}_s__rosidl_typesupport_c')
-
-
 def _warm_up():
     """Do once what each start does in the same way."""
     importlib.import_module('composer.schema.structure').is_sound({})
@@ -203,13 +179,11 @@ def _become(request, output):
     sys.argv[1:] = request['arguments']
     sys.orig_argv = [sys.executable, '-m', 'composer', *request['arguments']]
     del sys.modules['tests']
-    if 'composer.runtime.forked_children' in sys.modules:
-        # It is no child of a behaviour, which must end with it.
-        sys.modules['composer.runtime.forked_children'].in_child = False
 
 
 if __name__ == '__main__':
-    _import_all()
+    for name in _IMPORTED:
+        importlib.import_module(name)
     _warm_up()
     _become(*_serve(int(sys.argv[1])))
     runpy._run_module_as_main('composer')
