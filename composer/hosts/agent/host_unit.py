@@ -109,7 +109,9 @@ class Service:
 
     def state(self) -> dict[str, str]:
         """Return what systemd says of it."""
-        names = 'ActiveState,SubState,NRestarts,UnitFileState,Result,MainPID,ExecMainExitTimestamp'
+        names = (
+            'ActiveState,SubState,Job,NRestarts,UnitFileState,Result,MainPID,ExecMainExitTimestamp'
+        )
         lines = self._run('show', f'--property={names}', '--', self.name).splitlines()
         return dict(line.partition('=')[::2] for line in lines)
 
@@ -167,7 +169,7 @@ class Service:
         if self.abandoned.is_set():
             message = 'who deploys is gone'
             raise HostError(message)
-        if _has_succeeded(state):
+        if _has_succeeded(state) or _is_to_start(state):
             return
         has_restarted = state['NRestarts'] not in ('', self._restarts)
         has_ended = state['ActiveState'] in ('failed', 'inactive', 'deactivating')
@@ -196,8 +198,15 @@ class Service:
             return ''
 
 
+def _is_to_start(state: dict[str, str]) -> bool:
+    """Return whether systemd has not begun yet with what it was told."""
+    return state['ActiveState'] == 'inactive' and bool(state.get('Job'))
+
+
 def _has_succeeded(state: dict[str, str]) -> bool:
     """Return whether a system has run and has ended by itself."""
+    if _is_to_start(state):
+        return False
     has_ended = state['ActiveState'] == 'inactive' and state['Result'] == 'success'
     return has_ended and state['NRestarts'] == '0' and bool(state['ExecMainExitTimestamp'])
 

@@ -103,7 +103,7 @@ class Worker:
         try:
             result = self.call(step, *arguments)
         except ChannelLostError as error:
-            raise StartError(self.describe_failed_start(), help=self._advise(step)) from error
+            raise self.failed_start() from error
         if step == 'create':
             self.process.mark = result
         return result
@@ -212,18 +212,14 @@ class Worker:
             'nodes': self.nodes,
         }
 
-    def _advise(self, step: str) -> str | None:
-        """Return what may have ended its process in its first step."""
-        names = ', '.join(map(repr, self.spec.environment))
-        if not names or step != 'import_behaviours':
-            return None
-        return f"do Python and ROS start with the 'environment' of the worker, which sets {names}?"
-
-    def describe_failed_start(self) -> str:
-        """Return in words that its process has ended while it started."""
+    def failed_start(self) -> StartError:
+        """Return what to raise when its process has ended while it started."""
         run = self.process.run
         if run is not None:
             run.ended.wait(_END_SEC)
         if run is None or run.code is None:
-            return f"worker '{self.name}' does not answer"
-        return f"worker '{self.name}' {describe_end(run.code)} while it started"
+            return StartError(f"worker '{self.name}' does not answer")
+        names = '' if self.has_imported else ', '.join(map(repr, self.spec.environment))
+        advice = f"do Python and ROS start with its 'environment', which sets {names}?"
+        message = f"worker '{self.name}' {describe_end(run.code)} while it started"
+        return StartError(message, help=advice if names else None)

@@ -15,7 +15,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
-from composer.errors import ComposerError, ExitCode, StartError
+from composer.errors import ComposerError, ExitCode
 from composer.language.bindings import system_bindings
 from composer.network.transport_profile import shared_memory_variables
 from composer.runtime.rewiring.order_of_ends import order_ends
@@ -245,7 +245,7 @@ class Workers:
             worker.keep_to_rules()
         for worker in self._list():
             if not worker.is_alive:
-                raise StartError(worker.describe_failed_start())
+                raise worker.failed_start()
 
     def be_up(self) -> None:
         """Tell all workers that the system has started."""

@@ -71,6 +71,11 @@ CASES = [
         'workers: {w: {environment: {ROS_DOMIAN_ID: 7}}}\nnodes: {a: {worker: w}}',
         [('2:29', 'likely-misspelling', "did you mean 'ROS_DOMAIN_ID'?")],
     ),
+    pytest.param(
+        'workers: {w: {environment: {RMW_IMPLEMENTATION: rmw_fastrtps_cp}}}\nnodes: {a: {worker: w}}',
+        [('2:49', 'bad-environment', "did you mean 'rmw_fastrtps_cpp'?")],
+        marks=pytest.mark.ros,
+    ),
     # A worker is there for nodes.
     ('workers: {w: {}}\nnodes: {a: {}}', [('2:11', 'unused-worker', 'remove it, or name it in a node')]),
     ('workers: {vision: {}}\nnodes: {a: {worker: vison}}', [('2:11', 'unused-worker', "did you mean 'vison'?")]),

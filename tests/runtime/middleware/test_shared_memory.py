@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import struct
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -154,7 +155,11 @@ def test_a_port_of_another_user_stays(folder, monkeypatch):
 
 def locks_of(child):
     """Return the lock files of the segments of a process."""
-    files = [path.readlink() for path in Path(f'/proc/{child.pid}/fd').iterdir()]
+    files = []
+    for path in Path(f'/proc/{child.pid}/fd').iterdir():
+        # It may be closed between two looks.
+        with suppress(FileNotFoundError):
+            files.append(path.readlink())
     return [path for path in files if re.fullmatch('fast(rtps|dds)_[0-9a-f]{16}_el', path.name)]
 
 

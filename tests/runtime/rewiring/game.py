@@ -15,7 +15,7 @@ from composer.planning.plan import Action
 from composer.processes import worker_supervisor
 from composer.runtime import system as system_module
 from composer.runtime.workers.workers import Workers
-from tests.running import DEADLINE_SEC
+from tests.running import DEADLINE_SEC, wait_for
 from tests.runtime.rewiring.descriptions import describe_worker, merge
 from tests.runtime.rewiring.edits import Project
 from tests.runtime.rewiring.fresh_start import FreshStarter, running_system
@@ -57,7 +57,9 @@ class Game:
         self._plan = None
         self.applied = 0
         project.keep()
-        self._check_graph(see_graph(system._nodes[WITNESS].ros)[0], 'the start')
+        # What is in workers comes to both later.
+        inside = system._nodes[WITNESS].ros
+        wait_for(lambda: see_graph(inside)[0] == see_graph(self._observer.node)[0], 'the graph')
 
     def play(self, done=None):
         """Edit, reload, and compare; return the edits, and what came of them."""

@@ -107,8 +107,7 @@ def test_a_worker_whose_environment_keeps_python_from_starting_is_told_of(compos
     assert child.wait() == 1
     assert child.lines[-2:] == [
         "error: worker 'left' has ended with exit code 1 while it started",
-        "  help: do Python and ROS start with the 'environment' of the worker, which sets "
-        "'PYTHONHOME'?",
+        "  help: do Python and ROS start with its 'environment', which sets 'PYTHONHOME'?",
     ]
 
 
