@@ -34,12 +34,6 @@ settings.load_profile('steady')
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_collection_modifyitems(items):
-    """Begin with the hosts: their tests run in one process, and take longest."""
-    folder = ROOT / 'tests' / 'hosts'
-    items.sort(key=lambda each: folder not in each.path.parents)
-
-
 def pytest_terminal_summary(terminalreporter):
     """Show why tests failed that were run once more, whatever came of that."""
     for report in terminalreporter.stats.get('rerun', ()):
