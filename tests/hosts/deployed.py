@@ -203,15 +203,16 @@ class Project:
     def pids(self):
         return [pid for _, pid in self.states()]
 
-    def runs(self, release):
+    def releases(self):
+        """Return the release that each host runs; they number them themselves."""
+        return [release for (_, _, release, _), _ in self.states()]
+
+    def runs(self, releases):
+        """Return whether each host runs a release, and will after a boot."""
         return [state for state, _ in self.states()] == [
-            ('active', 'enabled', f'releases/{release}', False)
-        ] * 2
+            ('active', 'enabled', each, False) for each in releases
+        ]
 
     def hears(self, text):
         self.rear.run('rm', '-f', 'heard')
         wait_for(lambda: self.rear.run('cat', 'heard').stdout == text, f'{text!r} to be heard')
-
-
-def release_of(project):
-    return int(project.state('front')[0][2].rpartition('/')[2])

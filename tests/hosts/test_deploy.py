@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.host_bed import why_there_is_none
-from tests.hosts.deployed import FOLDER, UNITS, Project, release_of
+from tests.hosts.deployed import FOLDER, UNITS, Project
 from tests.running import wait_for
 
 pytestmark = [
@@ -22,7 +22,7 @@ def test_each_host_gets_its_part_and_runs_it(bed, tmp_path):
     done = project.deploy()
     assert done.stderr.splitlines()[-1] == 'robot: 2 hosts changed'
     assert '  + behaviours/talk.py\n' in done.stdout
-    assert project.runs(1)
+    assert project.runs(['releases/1'] * 2)
     project.hears('hello')
     bed.keep_packages()
 
@@ -74,7 +74,7 @@ def test_a_node_that_moves_leaves_the_one_host_before_it_comes_to_the_other(proj
 
 
 def test_a_host_that_is_left_stops_unless_all_go_back(project):
-    release = release_of(project)
+    releases = project.releases()
     project.edit('robot.yaml', 'host: rear', 'host: front')
     project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 24')
     project.edit('hosts.yaml', ', rear: {address: rear}', '')
@@ -82,14 +82,14 @@ def test_a_host_that_is_left_stops_unless_all_go_back(project):
     told = project.fail()
     assert 'rear: stopped\n' in told
     assert '  rear: the release before was restored' in told
-    assert project.runs(release)
+    assert project.runs(releases)
     project.rear.lose(100)
     told = project.fail()
     project.rear.lose(0)
     assert 'host rear (rear) cannot be reached: ' in told
     assert "help: '--leave rear' leaves it as it is, and forgets it" in told
     assert 'rear' not in project.deploy('--plan', '--leave', 'rear').stdout
-    assert project.runs(release)
+    assert project.runs(releases)
     project.hears('hello')
     project.edit('behaviours/counting.py', "raise ValueError('no sensor')", 'pass')
     project.edit('robot.yaml', 'domain_id: 24', 'domain_id: 20')

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from tests.host_bed import why_there_is_none
-from tests.hosts.deployed import FOLDER, UNITS, release_of
+from tests.hosts.deployed import FOLDER, UNITS
 from tests.running import wait_for
 
 pytestmark = [
@@ -17,14 +17,14 @@ pytestmark = [
 
 
 def test_if_one_host_cannot_start_all_go_back(project):
-    release = release_of(project)
+    releases = project.releases()
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
     project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 21')
     told = project.fail()
     assert 'error: host rear: the system did not start' in told
     assert 'no sensor' in told
     assert '  front: the release before was restored' in told
-    assert project.runs(release)
+    assert project.runs(releases)
     project.hears('hello')
 
 
@@ -33,7 +33,7 @@ def test_a_host_that_answers_that_it_starts_again_goes_back_like_the_others(proj
     project.edit('robot.yaml', 'nodes:', 'environment: {SITE: {file: site.txt}}\nnodes:')
     project.write('site.txt', 'lab\n')
     project.deploy()
-    release = release_of(project)
+    releases = project.releases()
     project.write('site.txt', 'field\n')
     assert 'front: reload\n' in project.deploy('--plan').stdout
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
@@ -42,11 +42,12 @@ def test_a_host_that_answers_that_it_starts_again_goes_back_like_the_others(proj
     assert 'error: host rear: the system did not start' in told
     assert 'no sensor' in told
     assert '  front: the release before was restored' in told
-    assert project.runs(release)
+    assert project.runs(releases)
     project.hears('hello')
 
 
 def test_a_first_deployment_that_fails_leaves_nothing(project):
+    releases = project.releases()
     (project.folder / 'robot.yaml').rename(project.folder / 'other.yaml')
     project.edit('other.yaml', 'domain_id: 20', 'domain_id: 22')
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
@@ -55,7 +56,7 @@ def test_a_first_deployment_that_fails_leaves_nothing(project):
     for host in (project.front, project.rear):
         assert host.run('ls', f'{FOLDER}/systems').stdout.split() == ['robot']
         assert 'other' not in host.run('ls', UNITS).stdout
-    assert project.runs(release_of(project))
+    assert project.runs(releases)
 
 
 def test_what_is_killed_on_a_host_comes_back_once(project):
@@ -98,27 +99,27 @@ def starting(project):
 
 
 def test_two_deployments_at_once_are_refused(project):
-    release = release_of(project)
+    releases = project.releases()
     process = starting(project)
     assert "error: host front: 'robot' is being deployed by root@" in project.fail()
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert project.runs(release)
+    assert project.runs(releases)
     assert 'front: the release before was restored' in told
 
 
 def test_if_the_laptop_is_gone_the_hosts_go_back(project):
-    release = release_of(project)
+    releases = project.releases()
     process = starting(project)
     process.kill()
     process.communicate()
-    wait_for(lambda: project.runs(release), 'the release before')
+    wait_for(lambda: project.runs(releases), 'the release before')
     project.hears('hello')
 
 
 def test_a_host_without_power_goes_back_when_it_is_on_again(project):
-    release = release_of(project)
+    releases = project.releases()
     process = starting(project)
     project.rear.kill()
     reader = threading.Thread(target=process.communicate)
@@ -127,18 +128,18 @@ def test_a_host_without_power_goes_back_when_it_is_on_again(project):
     reader.join(60)
     assert process.returncode == 1
     wait_for(
-        lambda: project.state('rear')[0][:3] == ('active', 'enabled', f'releases/{release}'),
+        lambda: project.state('rear')[0][:3] == ('active', 'enabled', releases[1]),
         'rear',
     )
     project.hears('hello')
     # The next deployment finds what is left.
     project.restore()
     assert 'rear: an earlier deployment was cut off' in project.deploy().stderr
-    assert project.runs(release)
+    assert project.runs(releases)
 
 
 def test_a_host_that_is_cut_off_goes_back_by_itself(project):
-    release = release_of(project)
+    releases = project.releases()
     process = starting(project)
     project.rear.cut()
     _, told = process.communicate(timeout=60)
@@ -146,5 +147,5 @@ def test_a_host_that_is_cut_off_goes_back_by_itself(project):
     assert 'error: host rear was lost' in told
     assert '  front: the release before was restored' in told
     project.rear.join()
-    wait_for(lambda: project.runs(release), 'the release before')
+    wait_for(lambda: project.runs(releases), 'the release before')
     project.hears('hello')
