@@ -64,6 +64,8 @@ class ActionClient:
         self._behaviours = EventBehaviours(node, 'action client', spec.name)
         self._behaviours.change(_behaviours_of(spec))
         self._goals: WeakSet[Goal] = WeakSet()
+        # Why the last server went that a worker took with it.
+        self._loss: ActionNotAvailableError | None = None
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -78,7 +80,13 @@ class ActionClient:
         """
         message = self._convert(payload)
         goal = Goal(self._name, self._node.waits)
-        send = partial(self._client.send_goal_async, message, partial(self._take_feedback, goal))
+        before = self._loss
+
+        def send() -> Future:
+            nonlocal before
+            before = self._loss
+            return self._client.send_goal_async(message, partial(self._take_feedback, goal))
+
         handle = self._requests.send(send, timeout_sec)
         if not handle.accepted:
             text = f"the server of '{self._name}' refused the goal"
@@ -86,6 +94,9 @@ class ActionClient:
         goal.begin(handle)
         self._goals.add(goal)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
+        # Its server may have gone before it was one of the goals.
+        if self._loss is not None and self._loss is not before:
+            goal.lose(self._loss)
         return goal
 
     def delivery(self) -> tuple[str, str]:
@@ -111,9 +122,9 @@ class ActionClient:
         """End the goals that were sent or accepted, if the server is one of these."""
         if self._name in names:
             message = f"the action server '{self._name}' ended before the goal did"
-            error = ActionNotAvailableError(message)
-            self._requests.fail(error)
-            self._lose_goals(error)
+            self._loss = ActionNotAvailableError(message)
+            self._requests.fail(self._loss)
+            self._lose_goals(self._loss)
 
     def _lose_goals(self, error: ActionNotAvailableError) -> None:
         for goal in list(self._goals):
