@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from composer.errors import ComposerError
 from composer.spelling import did_you_mean, find_nearest, suggest
@@ -44,6 +44,11 @@ LINES_OF_DEFINITION = 5
 MAX_MODULE_BYTES = 2_000_000
 MAX_MODULE_TOKENS = 100_000
 MAX_TOKENS_OF_MODULES = 400_000
+# Of a recording, an entry at once; and what a check reads to find its topics. Each number and
+# text in it counts as some bytes more: a million of them take a second.
+MAX_RECORDED_BYTES = 100_000_000
+MAX_SCANNED_BYTES = 200_000_000
+BYTES_OF_RECORDED_VALUE = 100
 
 _YAML = ('.yaml', '.yml')
 _KINDS = {
@@ -79,23 +84,33 @@ def read_file(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     Raises:
         UnreadableFileError: Why it cannot be read.
     """
+    with open_file(path) as file:
+        if os.fstat(file.fileno()).st_size > limit:
+            raise _too_large(limit)
+        try:
+            # Files of the kernel say that they are empty.
+            content = file.read(limit + 1) or b''
+        except OSError as error:
+            raise _unreadable(error) from error
+    if len(content) > limit:
+        raise _too_large(limit)
+    return content
+
+
+def open_file(path: Path) -> IO[bytes]:
+    """Open a regular file, without waiting for anything else that has its name.
+
+    Raises:
+        UnreadableFileError: It cannot be opened, or is no regular file.
+    """
     try:
         kind = _KINDS.get(stat.S_IFMT(path.stat().st_mode))
         if kind:
             message = f'cannot read the file: it is {kind}, not a regular file'
             raise UnreadableFileError(message)
-        with open(path, 'rb', opener=_open_without_waiting) as file:
-            if os.fstat(file.fileno()).st_size > limit:
-                raise _too_large(limit)
-            # Files of the kernel say that they are empty.
-            content = file.read(limit + 1) or b''
+        return open(path, 'rb', opener=_open_without_waiting)
     except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or error
-        message = f'cannot read the file: {reason}'
-        raise UnreadableFileError(message) from error
-    if len(content) > limit:
-        raise _too_large(limit)
-    return content
+        raise _unreadable(error) from error
 
 
 def explain_missing(
@@ -148,6 +163,11 @@ def format_size(size: int) -> str:
 def _open_without_waiting(path: str, flags: int) -> int:
     # It may have become a pipe since its kind was read.
     return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def _unreadable(error: Exception) -> UnreadableFileError:
+    reason = (error.strerror if isinstance(error, OSError) else None) or error
+    return UnreadableFileError(f'cannot read the file: {reason}')
 
 
 def _too_large(limit: int) -> FileTooLargeError:

@@ -23,6 +23,8 @@ HASH_KEY: Final = 'topic_type_hash'
 ROOT: Final = 'rosbag2_bagfile_information'
 _VERSION: Final = 9
 _NANOSECONDS: Final = 10**9
+# One of a publisher takes 500 characters.
+_LONGEST_QOS: Final = 100_000
 # rmw's RMW_DURATION_INFINITE.
 INFINITE_NS: Final = 2**63 - 1
 _POLICIES: Final = ('history', 'depth', 'reliability', 'durability')
@@ -71,9 +73,11 @@ def read_qos(profiles: str) -> list[dict[str, Any]]:
     What is no such text is of no publisher.
     """
     try:
-        found = yaml.safe_load(profiles) or []
+        found = yaml.safe_load(profiles if len(profiles) <= _LONGEST_QOS else '') or []
         return [_read_profile(each) for each in found]
-    except (yaml.YAMLError, AttributeError, IndexError, LookupError, TypeError, ValueError):
+    except (yaml.YAMLError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        return []
+    except RecursionError:  # lists in lists
         return []
 
 
@@ -85,7 +89,9 @@ def _read_profile(written: Mapping[str, Any]) -> dict[str, Any]:
     for name in _DURATIONS:
         sec, nsec = int(written[name]['sec']), int(written[name]['nsec'])
         is_infinite = (sec, nsec) in _OLD_INFINITE
-        policies[name] = INFINITE_NS if is_infinite else sec * _NANOSECONDS + nsec
+        policies[name] = (
+            INFINITE_NS if is_infinite else min(sec * _NANOSECONDS + nsec, INFINITE_NS)
+        )
     return policies
 
 

@@ -31,6 +31,9 @@ _SETTLED_SEC: Final = 1.0
 _LONGEST_SEARCH_SEC: Final = 5.0
 _ACKNOWLEDGED: Final = Duration(seconds=2)
 _LEAST_DEPTH: Final = 10
+_MOST_DEPTH: Final = 100_000
+# `sleep` takes no year.
+_LONGEST_SLEEP_SEC: Final = 3600.0
 # Longer durations are no limit.
 _LONGEST_NS: Final = 2**62
 _COMPARED: Final = ('deadline', 'liveliness', 'liveliness_lease_duration')
@@ -93,9 +96,8 @@ class RecordingPublisher:
             if publisher is None:
                 continue
             due_ns = begun_ns + (message.time_ns - since_ns) / rate
-            left_ns = due_ns - monotonic_ns()
-            if left_ns > 0:
-                sleep(left_ns / _NANOSECONDS)
+            while (left_ns := due_ns - monotonic_ns()) > 0:
+                sleep(min(left_ns / _NANOSECONDS, _LONGEST_SLEEP_SEC))
             publisher.publish(message.data)
             count += 1
         return count
@@ -132,7 +134,7 @@ def adapt_offer(offers: Sequence[Mapping[str, Any]]) -> QoSProfile:
         liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if is_all_kept else HistoryPolicy.KEEP_LAST,
-        depth=max(_LEAST_DEPTH, sum(each['depth'] for each in offers)),
+        depth=min(max(_LEAST_DEPTH, sum(each['depth'] for each in offers)), _MOST_DEPTH),
         reliability=ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if is_kept else DurabilityPolicy.VOLATILE,
         liveliness=liveliness,

@@ -6,11 +6,13 @@ Nothing here needs ROS until messages are decoded.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from composer.input_limits import MAX_SCANNED_BYTES, UnreadableFileError, read_file
 from composer.recordings import metadata
-from composer.recordings.mcap_reader import read_content, read_messages
+from composer.recordings.mcap_reader import Budget, read_content, read_messages
 from composer.recordings.recorded_topics import RawMessage, RecordedTopic, RecordingError, joined
 from composer.records import record
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
 _SUFFIX: Final = '.mcap'
+# In bytes: PyYAML takes seconds for one.
+_LARGEST_METADATA: Final = 1_000_000
 
 
 @record
@@ -75,18 +79,20 @@ class Recording:
                 yield message.time_ns, message.topic.name, decode(message.data)
 
 
-def read_recording(path: str | Path) -> Recording:
+def read_recording(path: str | Path, *, is_bounded: bool = False) -> Recording:
     """Read what a recording has, but not its messages.
 
     Args:
         path: An MCAP file, or a folder that rosbag2 has made of such files.
+        is_bounded: Whether it is an error if that takes longer than seconds.
 
     Raises:
         RecordingError: There is none, or it is of another kind, or damaged.
     """
     path = Path(path)
     files = _list_files(path)
-    parts = [read_content(each) for each in files]
+    budget = Budget(MAX_SCANNED_BYTES if is_bounded else None)
+    parts = [read_content(each, budget) for each in files]
     topics: dict[tuple[str, str], RecordedTopic] = {}
     for part in parts:
         for topic in part.topics:
@@ -105,7 +111,7 @@ def read_recording(path: str | Path) -> Recording:
 
 def _list_files(path: Path) -> list[Path]:
     if not path.is_dir():
-        if not path.exists():
+        if not os.path.lexists(path):
             message = f"there is no recording '{path}'"
             raise RecordingError(message, help='name an MCAP file, or a folder of rosbag2')
         return [path]
@@ -126,12 +132,16 @@ def _named_files(folder: Path) -> list[str]:
     """Return the files that the `metadata.yaml` of a folder names; none if it has none."""
     import yaml
 
+    path = folder / metadata.FILE_NAME
+    if not os.path.lexists(path):
+        return []
     try:
-        text = (folder / metadata.FILE_NAME).read_text(encoding='utf-8')
+        text = read_file(path, _LARGEST_METADATA).decode()
         named = yaml.safe_load(text)[metadata.ROOT]['relative_file_paths']
         return [str(each) for each in named]
-    except FileNotFoundError:
-        return []
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, LookupError, TypeError) as error:
-        message = f"'{folder / metadata.FILE_NAME}' cannot be read: {error}"
+    except UnreadableFileError as error:
+        message = f"'{path}': {error}"
+        raise RecordingError(message, help='name the MCAP file itself') from error
+    except (yaml.YAMLError, LookupError, TypeError, ValueError, RecursionError) as error:
+        message = f"'{path}' cannot be read: {error}"
         raise RecordingError(message, help='name the MCAP file itself') from error

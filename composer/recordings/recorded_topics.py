@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+import re
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from composer.errors import ComposerError
+from composer.recordings import metadata
 from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+# Of a package, and of a type in it: they become names of files.
+_NAME: Final = r'[A-Za-z]\w{0,199}'
+_TYPE_NAME: Final = re.compile(rf'({_NAME})(?:/(msg|srv|action))?/({_NAME})', re.ASCII)
 
 
 class RecordingError(ComposerError):
@@ -37,8 +44,7 @@ class RecordedTopic:
         name: Its full name.
         type: The full name of its type, as in `std_msgs/msg/String`.
         count: How many messages of it there are; `None` if the file does not say.
-        qos: That of each of its publishers: the policies by name, in small letters, and durations
-            in ns. Empty if it was not recorded.
+        offers: The QoS of its publishers as rosbag2 writes it; empty if it was not recorded.
         definition: The definitions of the type and of all that it uses; empty if unknown.
         type_hash: The hash of the type as `RIHS01_…`; empty if it was not recorded.
         problem: Why its messages cannot be used; empty if they can.
@@ -47,10 +53,21 @@ class RecordedTopic:
     name: str
     type: str
     count: int | None = None
-    qos: Sequence[Mapping[str, Any]] = ()
+    offers: str = ''
     definition: str = ''
     type_hash: str = ''
     problem: str = ''
+
+    @cached_property
+    def qos(self) -> Sequence[Mapping[str, Any]]:
+        """The QoS of each publisher: policies by name, in small letters, and durations in ns."""
+        return metadata.read_qos(self.offers)
+
+
+def full_type_name(name: str) -> str:
+    """Return the full name of a type, which writers other than rosbag2 shorten; else nothing."""
+    match = _TYPE_NAME.fullmatch(name)
+    return f'{match[1]}/{match[2] or "msg"}/{match[3]}' if match else ''
 
 
 def joined(first: RecordedTopic, second: RecordedTopic) -> RecordedTopic:
@@ -62,7 +79,7 @@ def joined(first: RecordedTopic, second: RecordedTopic) -> RecordedTopic:
         first.name,
         first.type,
         count,
-        first.qos or second.qos,
+        first.offers or second.offers,
         first.definition or second.definition,
         first.type_hash or second.type_hash,
         first.problem or second.problem,

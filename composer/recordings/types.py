@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,16 +12,17 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.errors import ComposerError
+from composer.input_limits import MAX_BYTES_OF_DEFINITIONS, format_size
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.classes import InterfaceNotFoundError, import_interface
 from composer.recordings.definitions import full_definition, import_message, type_hash
-from composer.recordings.recorded_topics import RecordedTopic, RecordingError
+from composer.recordings.recorded_topics import RecordedTopic, RecordingError, full_type_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
 
 _PART: Final = re.compile(r'^=+\nMSG: *(\S+) *\n', re.MULTILINE)
-_FIELD: Final = re.compile(r'^[ \t]*([\w/]+)(\S*)[ \t]+(\w+)\b(?![ \t]*=)', re.MULTILINE)
+_FIELD: Final = re.compile(r'^[ \t]*+([\w/]++)(\S*+)[ \t]++(\w++)\b(?![ \t]*+=)', re.MULTILINE)
 # By its other name, as `full_definition` has it.
 _OTHER_NAMES: Final = {'char': 'uint8'}
 
@@ -46,8 +47,12 @@ class MessageTypes:
     ) -> None:
         self.problems: dict[tuple[str, str], str] = {}
         self._classes: dict[tuple[str, str], type] = {}
-        usable = [each for each in topics if not each.problem]
-        self.problems |= {(each.name, each.type): each.problem for each in topics if each.problem}
+        usable = []
+        for topic in topics:
+            if problem := topic.problem or _find_problem(topic):
+                self.problems[topic.name, topic.type] = problem
+            else:
+                usable.append(topic)
         reason = _build_missing(usable, progress)
         for topic in usable:
             try:
@@ -67,6 +72,15 @@ class MessageTypes:
         """Return what makes a message of its recorded bytes; `None` if it has a problem."""
         found = self.find(topic)
         return found and partial(_decode, topic, found)
+
+
+def _find_problem(topic: RecordedTopic) -> str:
+    """Return why the definition of a topic's type cannot be used; nothing if it can."""
+    try:
+        split_definition(topic.definition, topic.type)
+    except RecordingError as error:
+        return str(error)
+    return ''
 
 
 def _decode(topic: RecordedTopic, message_class: type, data: bytes) -> Any:
@@ -96,6 +110,7 @@ def _check_definition(topic: RecordedTopic, message_class: type) -> None:
         raise RecordingError(message)
 
 
+@lru_cache(maxsize=64)
 def _fields_by_type(definition: str, root: str) -> dict[str, list[tuple[str, ...]]]:
     """Return the types and names of fields, with short names of types, whatever else differs."""
     return {
@@ -107,17 +122,27 @@ def _fields_by_type(definition: str, root: str) -> dict[str, list[tuple[str, ...
     }
 
 
+@lru_cache(maxsize=64)
 def split_definition(definition: str, root: str) -> dict[str, str]:
     """Return the definition of each message in a recorded one, by full name.
 
     Args:
         root: The full name of the first one.
+
+    Raises:
+        RecordingError: It is too large, or names what is no type.
     """
+    if len(definition) > MAX_BYTES_OF_DEFINITIONS:
+        message = f'the definition of {root} has more than {format_size(MAX_BYTES_OF_DEFINITIONS)}'
+        raise RecordingError(message)
     first, *others = _PART.split(definition)
     found = {root: first}
     for name, text in zip(others[::2], others[1::2], strict=True):
-        package, _, short = name.rpartition('/')
-        found[f'{package.partition("/")[0]}/msg/{short}'] = text
+        full_name = full_type_name(name)
+        if not full_name:
+            message = f"the definition of {root} has a part '{name}', which is no type of ROS"
+            raise RecordingError(message)
+        found[full_name] = text
     return found
 
 

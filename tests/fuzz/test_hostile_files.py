@@ -18,19 +18,19 @@ MEMORY_BYTES = 200_000_000
 LIMIT_SEC = 30
 
 
-def check(folder):
-    """Run `composer check system.yaml` in a process with limits; return its code and output."""
+def run_limited(folder, words=('check', 'system.yaml'), memory=MEMORY_BYTES):
+    """Run a command in a process with limits; return its code and output."""
     output = folder / 'output.txt'
     child = os.fork()
     if not child:
         with contextlib.suppress(BaseException):
-            _run_in_child(folder, output)
+            _run_in_child(folder, output, words, memory)
         os._exit(99)
     _, status = os.waitpid(child, 0)
     return os.waitstatus_to_exitcode(status), output.read_text(errors='replace')
 
 
-def _run_in_child(folder, output):
+def _run_in_child(folder, output, words, more):
     os.chdir(folder)
     written = os.open(output, os.O_WRONLY | os.O_CREAT)
     for number in (1, 2):
@@ -40,9 +40,9 @@ def _run_in_child(folder, output):
     signal.alarm(LIMIT_SEC * 4)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_SEC, LIMIT_SEC))
     pages = int(Path('/proc/self/statm').read_text().split()[0])
-    memory = pages * resource.getpagesize() + MEMORY_BYTES
+    memory = pages * resource.getpagesize() + more
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    code = run(['check', 'system.yaml'])
+    code = run(list(words))
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
@@ -52,6 +52,6 @@ def _run_in_child(folder, output):
 def test_hostile_files_end_in_findings(name, tmp_path):
     write_files, rules = CASES[name]
     write_files(tmp_path)
-    code, output = check(tmp_path)
+    code, output = run_limited(tmp_path)
     assert code == (1 if 'error[' in output else 0), output[-2000:]
     assert rules <= set(re.findall(r'(?:error|warning)\[([\w-]+)\]', output))

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from composer.recordings.types import MessageTypes
 
 _NANOSECONDS = 10**9
+# Each is a publisher.
+_MOST_TOPICS = 5000
 
 
 def replay(
@@ -55,6 +57,9 @@ def replay(
     wanted = [each for each in recording.topics if patterns.has(each.name)]
     for remark in patterns.describe_unused([each.name for each in recording.topics]):
         terminal.warning(remark)
+    if len(wanted) > _MOST_TOPICS:
+        message = f"'{path}' has {len(wanted):,} topics, and {_MOST_TOPICS:,} are replayed at most"
+        raise ComposerError(message, help='name some with --topics')
     with signals.interrupting(), graph_node('_composer_replay', ros_arguments) as node:
         # These import rclpy, which the node has found.
         from composer.recordings.publishing import RecordingPublisher

@@ -35,9 +35,9 @@ def check_recording_of_case(
         and not context.has_own_end('topic', each.name, provides=True)
     ]
     if not heard:
-        names = ', '.join(each.name for each in content.topics) or 'none'
+        names = [each.name for each in content.topics]
         message = f'{recording} has no topic that the system hears and does not publish itself'
-        yield context.at_value(path, _RULE, message, help=f'its topics are {names}')
+        yield context.at_value(path, _RULE, message, help=suggest('', names, 'its topics are'))
     for each in heard:
         known = context.type_of('topic', each.name)
         if known is not None and known != each.type:
@@ -82,7 +82,7 @@ def _read(
         yield context.at_value(path, 'unreadable-file', message, help=help_text)
         return None
     try:
-        return read_recording(recording)
+        return read_recording(recording, is_bounded=True)
     except RecordingError as error:
         yield context.at_value(path, 'unreadable-file', str(error), help=error.help)
         return None
