@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 import yaml
 
 from composer.ament import find_share
+from composer.input_limits import UnreadableFileError, read_file
 from composer.language.includes.include_entry import shown_path
 from composer.language.paths import PackagePathError, PathError, explain_absent, resolve_path
 from composer.programs import base_environment, is_on_path, shell_environment
@@ -57,15 +58,15 @@ def check_launch_files(context: CheckContext) -> Iterator[Diagnostic]:
 def read_launch_arguments(path: Path) -> DeclaredArguments | None:
     """Return the arguments that a launch file declares; `None` if only running it would tell."""
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            return None
-        text = path.read_text(encoding='utf-8')
+        text = read_file(path, _MAX_BYTES).decode()
         if path.suffix == '.xml':
             return _read_xml(ET.fromstring(text))  # noqa: S314 - a file of the user, as all are
         if path.suffix in ('.yaml', '.yml'):
             return _read_yaml(yaml.safe_load(text))
         return _read_python(ast.parse(text))
-    except (OSError, ValueError, SyntaxError, RecursionError, ET.ParseError, yaml.YAMLError):
+    except (UnreadableFileError, ValueError, SyntaxError, ET.ParseError, yaml.YAMLError):
+        return None
+    except RecursionError:
         return None
 
 

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
+from composer.input_limits import UnreadableFileError, read_file
 from composer.version import find_version
 
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ def render_dockerfile(root: Path, *, has_interfaces: bool) -> str:
 def _find_dependencies(root: Path) -> list[str]:
     """Return the dependencies that the project declares, but for Composer itself."""
     try:
-        data = tomllib.loads((root / 'pyproject.toml').read_text(encoding='utf-8'))
-    except (OSError, ValueError):
+        data = tomllib.loads(read_file(root / 'pyproject.toml').decode())
+    except (UnreadableFileError, ValueError):
         return []
     project = data.get('project')
     found = project.get('dependencies') if isinstance(project, dict) else None

@@ -16,6 +16,7 @@ from composer.errors import ComposerError, UsageError
 from composer.export.documents import render_document
 from composer.export.images import PROJECT
 from composer.export.parts import keep_apart
+from composer.input_limits import read_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,7 +98,7 @@ def _config_map(export: Export) -> dict[str, Any]:
     texts: dict[str, str] = {}
     others: dict[str, str] = {}
     for key, path in _keys(export).items():
-        content = b'' if path.name == _MARK else path.read_bytes()
+        content = b'' if path.name == _MARK else read_file(path)
         try:
             texts[key] = content.decode()
         except UnicodeDecodeError:

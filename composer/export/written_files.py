@@ -11,6 +11,7 @@ import re
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.input_limits import read_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,7 +49,7 @@ def write_files(folder: Path, files: Mapping[str, str]) -> list[Path]:
 def _check(path: Path) -> None:
     if not path.exists():
         return
-    content = path.read_bytes()
+    content = read_file(path)
     found = _MARK.match(content)
     if found and _checksum(content[found.end() :]).encode() == found[1]:
         return

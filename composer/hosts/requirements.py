@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.input_limits import read_file
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -80,7 +81,9 @@ def project_requirements(folders: Iterable[Path]) -> list[str]:
     for folder in folders:
         listed = folder / 'requirements.txt'
         if listed.is_file():
-            lines = (line.split(' #')[0].strip() for line in listed.read_text().splitlines())
+            lines = (
+                line.split(' #')[0].strip() for line in read_file(listed).decode().splitlines()
+            )
             found += [line for line in lines if line and not line.startswith(('#', '-'))]
         found += _read_pyproject(folder / 'pyproject.toml')
     return list(dict.fromkeys(found))
@@ -91,7 +94,7 @@ def _read_pyproject(path: Path) -> list[str]:
 
     if not path.is_file():
         return []
-    project = tomllib.loads(path.read_text(encoding='utf-8')).get('project', {})
+    project = tomllib.loads(read_file(path).decode()).get('project', {})
     if project.get('name') == _COMPOSER:
         return []
     return [str(each) for each in project.get('dependencies', ())]

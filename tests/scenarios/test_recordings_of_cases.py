@@ -100,7 +100,7 @@ def test_a_topic_that_was_not_recorded_is_found(load, tmp_path):
     write_recording(tmp_path / 'other.mcap', {'/outt': [scan(0.1)]})
     assert check(load('recording: other.mcap', '{topic: /out, like: other.mcap}')) == [
         'unrecorded-topic: other.mcap has no topic that the system hears and does not publish '
-        'itself (its topics are /outt)',
+        'itself (its topics are: /outt)',
         "unrecorded-topic: other.mcap has no messages of /out (did you mean '/outt'?)",
     ]
 
