@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.checks.placement.crossings import place_of
+from composer.confidential import conceal, hidden_values
 from composer.drawing.delivery import deliveries_of
 from composer.drawing.finding_places import FindingPlaces
 from composer.drawing.qos_labels import differing_policies
@@ -145,7 +147,7 @@ def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Pict
     nodes = tuple(_nodes(context, places))
     ids = {node.path: node.id for node in nodes}
     channels = tuple(_channels(topology, places))
-    return Picture(
+    picture = Picture(
         context.spec.name,
         context.spec.description,
         nodes,
@@ -155,6 +157,42 @@ def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Pict
         tuple(findings),
         context.system.positions,
     )
+    return _concealed(picture, _Names()) if hidden_values() else picture
+
+
+class _Names:
+    """What is shown for names and ids: those that differ still do."""
+
+    def __init__(self) -> None:
+        self._shown: dict[str, str] = {}
+        self._taken: set[str] = set()
+
+    def show(self, text: str) -> str:
+        if text not in self._shown:
+            shown = concealed = conceal(text)
+            number = 1
+            while shown != text and shown in self._taken:
+                number += 1
+                shown = f'{concealed} {number}'
+            self._shown[text] = shown
+            self._taken.add(shown)
+        return self._shown[text]
+
+
+def _concealed(value: Any, names: _Names) -> Any:
+    """Return a part of a picture with the origins of hidden values in their place."""
+    if isinstance(value, str):
+        return names.show(value)
+    if isinstance(value, tuple):
+        return tuple(_concealed(each, names) for each in value)
+    if isinstance(value, Picture | NodeBox | ChannelBox | Edge | Wait):
+        inner = {each.name: getattr(value, each.name) for each in fields(value)}
+        # By its path a part is found in the file.
+        known = {'path', 'findings', 'kind', 'external', 'place', 'positions'}
+        return replace(
+            value, **{k: _concealed(v, names) for k, v in inner.items() if k not in known}
+        )
+    return value
 
 
 def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:

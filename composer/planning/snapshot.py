@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
+    from composer.diagnostics import Span
     from composer.language.specs import SystemSpec
     from composer.ros_parameters.file_reader import ParameterEntry
-    from composer.yaml_text.positions import SourceMap
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 
 @dataclass(slots=True)
@@ -30,6 +31,7 @@ class Snapshot:
         generators: The behaviours of timers that are generators.
         set_live: The parameters that somebody has set while the system ran, by the nodes' full
             names; `None` if it does not run.
+        read_at_start: Where values are written that are read from files and of commands.
     """
 
     spec: SystemSpec
@@ -41,6 +43,11 @@ class Snapshot:
     prefixes: tuple[str, ...] = ()
     generators: Collection[str] = frozenset()
     set_live: Mapping[str, Collection[str]] | None = None
+    read_at_start: Collection[Span] = frozenset()
+
+    def is_read_at_start(self, path: DataPath) -> bool:
+        """Return whether the value at a path is read when the system starts."""
+        return bool(self.read_at_start) and self.positions.value(path) in self.read_at_start
 
     def stale_modules(self, other: Snapshot) -> set[str]:
         """Return the modules whose source, or what they import, differs from `other`'s."""

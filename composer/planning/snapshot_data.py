@@ -1,14 +1,16 @@
 """A snapshot as plain data and back, for `composer plan` to compare files with a running system.
 
-It holds digests, no sources; values of environment variables are left out, as in findings. Reading
-it back creates the records of `composer.language.specs`, and nothing else.
+It holds digests, no sources. Values of environment variables are left out, as in findings, and
+so are those that are read when the system starts. Reading it back creates the records of
+`composer.language.specs`, and nothing else.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +23,6 @@ from composer.ros_parameters.file_reader import ParameterEntry
 from composer.yaml_text.positions import SourceMap
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from composer.yaml_text.positions import DataPath
 
 _RECORDS: dict[str, Any] = {
@@ -32,6 +32,9 @@ _RECORDS: dict[str, Any] = {
 }
 # Relative to the folder that Composer was started in, which may be another one.
 _PATHS = frozenset(('cwd', 'file', 'interfaces'))
+_VARIABLES = frozenset(('environment', 'env'))
+# By so much of its digest a value is known to be another one, and a secret is not found.
+_DIGITS = 4
 
 
 def encode_snapshot(snapshot: Snapshot) -> dict[str, Any]:
@@ -46,7 +49,7 @@ def encode_snapshot(snapshot: Snapshot) -> dict[str, Any]:
 
     place(Span(snapshot.positions.source, 1, 1))
     data = {
-        'spec': _encode(snapshot.spec),
+        'spec': _encode(_without_secrets(snapshot, snapshot.spec)),
         'keys': places(snapshot.positions.keys),
         'values': places(snapshot.positions.values),
         'code': dict(snapshot.code),
@@ -111,6 +114,44 @@ def _decode_snapshot(data: Mapping[str, Any]) -> Snapshot:
         frozenset(data['generators']),
         dict(data['set_live']),
     )
+
+
+def conceal_snapshot(snapshot: Snapshot) -> Snapshot:
+    """Return what others may see of a snapshot; it can be compared with another such one."""
+    return decode_snapshot(encode_snapshot(snapshot))
+
+
+def _without_secrets(snapshot: Snapshot, value: Any) -> Any:
+    """Return a record with digests in place of what is left out, also in the records in it."""
+    if isinstance(value, Mapping):
+        inner = {k: _without_secrets(snapshot, v) for k, v in value.items()}
+        return inner if isinstance(value, dict) else MappingProxyType(inner)
+    if isinstance(value, tuple):
+        return tuple(_without_secrets(snapshot, each) for each in value)
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    changed = {
+        each.name: _without_secrets(snapshot, getattr(value, each.name)) for each in fields(value)
+    }
+    path: DataPath = changed.get('path', ())
+    for name in _VARIABLES & changed.keys():
+        changed[name] = MappingProxyType({k: _digest(v) for k, v in changed[name].items()})
+    if isinstance(value, specs.ParameterSpec):
+        if snapshot.is_read_at_start(path) or snapshot.is_read_at_start((*path, 'default')):
+            changed['value'] = _digest(value.value)
+    elif isinstance(value, specs.ProcessSpec | specs.ComponentSpec):
+        changed['parameters'] = MappingProxyType(
+            {
+                k: _digest(v) if snapshot.is_read_at_start((*path, 'parameters', k)) else v
+                for k, v in changed['parameters'].items()
+            }
+        )
+    return replace(value, **changed)
+
+
+def _digest(value: Any) -> str:
+    text = repr(value).encode(errors='surrogatepass')
+    return f'<left out: {hashlib.sha256(text).hexdigest()[:_DIGITS]}>'
 
 
 def _encode(value: Any, key: str = '') -> Any:

@@ -50,6 +50,7 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         _read_overrides([*nodes, *spec.components]),
         tuple(map(str, prefixes)),
         frozenset(_find_generators(context)),
+        read_at_start=frozenset(each.span for each in context.system.start.found),
     )
 
 

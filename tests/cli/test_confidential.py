@@ -83,6 +83,28 @@ def test_variables_of_processes_are_in_no_drawing(project, capsys):
         assert not [word for word in ('literal', SECRET) if word in shown]
 
 
+NAMES = """
+version: 1
+nodes:
+  "{{ env('PW') | replace('-', '_') }}":
+    namespace: "x{{ env('PIN') }}"
+    publishers: {p: {type: std_msgs/msg/String, topic: "t_{{ env('PIN') }}", external: true}}
+  other: {description: "is {{ env('PW') }}"}
+processes: {"p_{{ env('PIN') }}": {command: [sh]}}
+"""
+
+
+def test_names_from_the_environment_are_in_no_drawing(project, monkeypatch, capsys):
+    monkeypatch.setenv('PIN', '73519')
+    (project / 'a.yaml').write_text(NAMES)
+
+    for name in ('json', 'mermaid', 'dot', 'html'):
+        assert run(['graph', 'a.yaml', '--format', name]) == 0
+        shown = capsys.readouterr().out
+        assert 'env(' in shown
+        assert not [word for word in ('s3cr3t', '73519') if word in shown]
+
+
 def test_show_keeps_the_expression_of_a_hidden_variable(project, capsys):
     (project / 'a.yaml').write_text(PROCESSES)
 

@@ -1,6 +1,7 @@
 """What an edit of workers does, and of the nodes in them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -153,4 +154,5 @@ def test_a_system_with_workers_and_hosts_is_described_in_full(tmp_path):
     system = load_system(path)
     snapshot = Snapshot(system.spec.on_host(''), system.positions, {}, {}, {}, {})
     decoded = decode_snapshot(json.loads(json.dumps(encode_snapshot(snapshot))))
-    assert decoded.spec == snapshot.spec
+    assert str(decoded.spec.workers['vision'].environment['OMP']).startswith('<left out: ')
+    assert replace(decoded.spec, workers=snapshot.spec.workers) == snapshot.spec

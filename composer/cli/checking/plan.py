@@ -19,7 +19,7 @@ from composer.language.values.start_reader import StartValueReader
 from composer.network.variables import ros_variables
 from composer.planning import json_document, text
 from composer.planning.differences import compare
-from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
+from composer.planning.snapshot_data import conceal_snapshot, decode_snapshot
 from composer.planning.snapshot_taking import take_snapshot
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def _compare_with_running(context: CheckContext) -> Plan:
     old = decode_snapshot(read_answer(answer.text))
     new = take_snapshot(context, [Path(each) for each in old.prefixes])
     # What was left out of the one is left out of the other.
-    return compare(old, decode_snapshot(encode_snapshot(new)))
+    return compare(old, conceal_snapshot(new))
 
 
 def _read(

@@ -21,6 +21,7 @@ from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
 from composer.planning.differences import compare, find_new_start
+from composer.planning.snapshot_data import conceal_snapshot
 from composer.planning.snapshot_taking import take_snapshot
 from composer.planning.text import STARTS_AGAIN, render_plan
 from composer.python_source.module_finder import project_search_path
@@ -141,7 +142,9 @@ class Reloader:
                 new = take_snapshot(context, self._prefixes)
             except ComposerError as error:
                 return Outcome(succeeded=False, text=with_findings(findings, str(error)))
-            text = render_plan(compare(system.snapshot, new)).rstrip('\n')
+            # Who asks may be anybody on the ROS graph.
+            plan = compare(conceal_snapshot(system.snapshot), conceal_snapshot(new))
+            text = render_plan(plan).rstrip('\n')
         return Outcome(succeeded=True, text=with_findings(findings, text))
 
     def _rewire(

@@ -9,12 +9,15 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.checks.checker import create_context
+from composer.cli.common.file_selection import load_given
 from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
+from composer.language.values.start_reader import StartValueReader
 from composer.planning.differences import compare
-from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
+from composer.planning.snapshot_data import conceal_snapshot, decode_snapshot, encode_snapshot
 from composer.planning.snapshot_taking import take_snapshot
+from composer.planning.text import render_plan
 from tests.running import ROOT
 
 SYSTEM = """
@@ -92,3 +95,45 @@ def test_files_are_compared_with_the_running_system(compose, capsys, monkeypatch
     code, _, errors = plan()
     assert code == 1
     assert errors.startswith("error: there is no system 'system' on this ROS graph")
+
+
+SECRETS = """\
+version: 1
+environment: {TOKEN: s3cr3t-1, PIN: {file: pin.txt}}
+nodes:
+  n:
+    parameters:
+      a: {file: pin.txt}
+      b: {file: pin.txt, description: a pin}
+processes:
+  p: {command: [sh], env: {TOKEN: s3cr3t-2, OTHER: {command: [cat, pin.txt]}}}
+  q: {package: demo_nodes_cpp, executable: talker, parameters: {c: {file: pin.txt}}}
+"""
+
+
+def test_a_snapshot_tells_that_secrets_change_but_not_what_they_are(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def snapshot_with(pin, text):
+        Path('pin.txt').write_text(pin)
+        Path('a.yaml').write_text(text)
+        system = load_given([Path('a.yaml')], (), (), None, StartValueReader())
+        return take_snapshot(create_context(system, InterfaceCatalogue()))
+
+    old = snapshot_with('s3cr3t-3', SECRETS)
+    same = conceal_snapshot(snapshot_with('s3cr3t-3', SECRETS))
+    new = snapshot_with('s3cr3t-4', SECRETS.replace('s3cr3t-2', 's3cr3t-5'))
+
+    assert 's3cr3t' not in json.dumps([encode_snapshot(old), encode_snapshot(new)])
+    assert not compare(conceal_snapshot(old), same)
+    plan = compare(conceal_snapshot(old), conceal_snapshot(new))
+    assert 's3cr3t' not in render_plan(plan)
+    keys = {(each.name, change.key) for each in plan.operations for change in each.changes}
+    assert keys == {
+        ('a', 'environment.PIN'),
+        ('a', 'default'),
+        ('b', 'default'),
+        ('p', 'env.TOKEN'),
+        ('p', 'env.OTHER'),
+        ('q', 'parameters.c'),
+    }
