@@ -106,7 +106,9 @@ def value_of(field_type: FieldType, owner: Message) -> Value:
     """
     if field_type.nested and not field_type.array:
         return Message(field_type.nested, owner.is_made, owner.is_read_only)
-    if field_type.array and (field_type.nested or not owner.is_made):
+    if field_type.array and (
+        field_type.nested or not owner.is_made or field_type.array == 'fixed'
+    ):
         return ArrayField(field_type, owner.is_made, owner.is_read_only)
     if owner.is_made:
         return UNKNOWN

@@ -170,15 +170,6 @@ class ProjectModules:
                 return self.star_home(home, name)
         return None
 
-    def public_names(self, name: str) -> list[str]:
-        """Return the names that a module lists in its `__all__`."""
-        module = self._finder.find(name)
-        for statement in module.body if isinstance(module, ModuleSource) else ():
-            match statement:
-                case ast.Assign(targets=[ast.Name('__all__')], value=ast.List(elts=items)):
-                    return [str(each.value) for each in items if isinstance(each, ast.Constant)]
-        return []
-
     def top(self, module: ModuleSource) -> TopNames:
         """Return the names at the top of a module."""
         if id(module) not in self._tops:

@@ -54,7 +54,7 @@ def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> 
             return Annotation()
     if isinstance(expression, ast.Subscript):
         return _read_subscript(expression)
-    name = _dotted(expression)
+    name = dotted_name(expression)
     if name in _BUILTINS and name not in imports:
         return Annotation(builtin=name)
     first, separator, rest = name.partition('.')
@@ -63,7 +63,7 @@ def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> 
 
 
 def _read_subscript(expression: ast.Subscript) -> Annotation:
-    name = _dotted(expression.value)
+    name = dotted_name(expression.value)
     if name in _BUILTINS:
         return Annotation(builtin=name)
     if name.rpartition('.')[2] in _GENERATORS:
@@ -72,7 +72,7 @@ def _read_subscript(expression: ast.Subscript) -> Annotation:
     return Annotation()
 
 
-def _dotted(expression: ast.expr | None) -> str:
+def dotted_name(expression: ast.expr | None) -> str:
     """Return a dotted name such as `a.b.c`, or an empty text."""
     parts: list[str] = []
     while isinstance(expression, ast.Attribute):

@@ -13,11 +13,11 @@ from composer.language.pipeline import load_system
 def check(tmp_path, monkeypatch):
     """Return a function that checks a system whose behaviours are in the module `parts`.
 
-    It returns each finding's line and rule, or of one rule the messages.
+    It returns each finding's line and rule, or of one rule the messages, or the helps.
     """
     monkeypatch.chdir(tmp_path)
 
-    def run(nodes, code='', *, before='', rule=None, installed=True):
+    def run(nodes, code='', *, before='', rule=None, installed=True, tells='message'):
         (tmp_path / 'parts.py').write_text(dedent(code))
         path = tmp_path / 'system.yaml'
         listed = nodes.lstrip('\n')
@@ -26,6 +26,6 @@ def check(tmp_path, monkeypatch):
         findings = check_system(load_system(path), catalogue)
         if rule is None:
             return [(finding.span.line, finding.rule) for finding in findings]
-        return [finding.message for finding in findings if finding.rule == rule]
+        return [getattr(finding, tells) for finding in findings if finding.rule == rule]
 
     return run

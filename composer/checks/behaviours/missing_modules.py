@@ -13,8 +13,11 @@ import sys
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from composer.checks.behaviours.missing_names import KINDS, Library
 from composer.diagnostics import Span, diagnostic_at
+from composer.inference.current_run import span_of
 from composer.inference.module_names import TopNames
+from composer.inference.values import Place
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 from composer.records import record
@@ -25,12 +28,10 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
 
 _RULE = 'missing-module'
 _Import = ast.Import | ast.ImportFrom
-_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 # A module with one of these may find modules, or make some, where nobody knows.
 _CHANGES_THE_SEARCH = re.compile(
     r'\bsys\.(path|modules|meta_path)\b|\bpath\.(append|extend|insert)\(|\baddsitedir\b|__path__'
@@ -50,8 +51,18 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
         if not context.was_dropped(binding.behaviour.path):
             walk.visit(binding.behaviour.module, binding)
             walk.visit_function(binding)
-    if not any(_CHANGES_THE_SEARCH.search('\n'.join(module.lines)) for module in walk.modules):
+    modules = [each.source for each in walk.importers]
+    if not any(_CHANGES_THE_SEARCH.search('\n'.join(module.lines)) for module in modules):
         yield from walk.findings
+        library = Library(context)
+        for importer in walk.importers:
+            for missing in library.find_missing(importer.source):
+                place = _place_of(missing.node, importer.source)
+                where = f"'{importer.binding.behaviour.name}' is in this module, or imports it"
+                related = [context.related_value(importer.binding.behaviour.path, where)]
+                yield diagnostic_at(
+                    place, missing.rule, missing.message, help=missing.help, related=related
+                )
 
 
 @record
@@ -69,7 +80,7 @@ class _Walk:
 
     context: CheckContext
     findings: list[Diagnostic] = field(default_factory=list)
-    modules: list[ModuleSource] = field(default_factory=list)
+    importers: list[_Importer] = field(default_factory=list)
     _visited: set[str] = field(default_factory=set)
     _searches: int = 0
 
@@ -82,15 +93,15 @@ class _Walk:
                 continue
             self._visited.add(each)
             is_followed = (
-                len(self.modules) < _MOST_MODULES and each.partition('.')[0] != 'composer'
+                len(self.importers) < _MOST_MODULES and each.partition('.')[0] != 'composer'
             )
             if not (is_followed and self.context.modules.is_of_project(each)):
                 continue
             pending += [each.rpartition('.')[0]] if '.' in each else []
             module = self.context.modules.find(each)
             if isinstance(module, ModuleSource) and module.path is not None:
-                self.modules.append(module)
                 importer = _Importer(each, module, binding)
+                self.importers.append(importer)
                 for statement in module.required:
                     pending += self._check(statement, importer)
 
@@ -131,12 +142,8 @@ class _Walk:
             return []
         aliases = [each for each in statement.names[:_MOST_SEARCHES] if each.name != '*']
         for alias in aliases:
-            if self._is_of_interfaces(home):
-                self._check_type(home, alias, importer)
-            elif self._is_of_project(home):
+            if self._is_of_project(home) and not self._is_of_interfaces(home):
                 self._check_member(home, alias, importer)
-            elif home in sys.modules and _is_of_python(home):
-                self._check_attribute(home, alias, importer)
         return [home, *(f'{home}.{alias.name}' for alias in aliases)]
 
     def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
@@ -152,8 +159,8 @@ class _Walk:
         if self._is_of_interfaces(name):
             # What is declared may be built only later.
             kind = name.split('.')[1] if '.' in name else ''
-            if kind and kind not in _KINDS:
-                help_text = did_you_mean(find_nearest(kind, _KINDS))
+            if kind and kind not in KINDS:
+                help_text = did_you_mean(find_nearest(kind, KINDS))
                 self._report(f"there is no module '{name}'", help_text, importer, place)
             return True
         missing = modules.find_missing(name)
@@ -183,31 +190,6 @@ class _Walk:
     def _is_of_interfaces(self, name: str) -> bool:
         top = name.partition('.')[0]
         return top in self.context.spec.interfaces or top in self.context.catalogue.packages()
-
-    def _check_type(self, home: str, alias: ast.alias, importer: _Importer) -> None:
-        """Check a message, service or action, or a part of one, that is imported."""
-        package, _, kind = home.partition('.')
-        known = self.context.catalogue.packages()
-        if kind not in _KINDS or not alias.name[:1].isupper() or package not in known:
-            return
-        names = self.context.catalogue.names(kind, package)
-        types = {each.rpartition('/')[2] for each in names}
-        # The parts of services and actions are called `SetBool_Request` and the like.
-        if alias.name.partition('_')[0] not in types:
-            message, help_text = f"{home} has no '{alias.name}'", suggest(alias.name, types)
-            self._report(message, help_text, importer, _place_of_name(alias, importer.source))
-
-    def _check_attribute(self, home: str, alias: ast.alias, importer: _Importer) -> None:
-        """Check a name that is imported from a module of Python that is loaded already."""
-        module = sys.modules[home]
-        if not hasattr(module, alias.name) and not self.context.modules.has(
-            f'{home}.{alias.name}'
-        ):
-            # Another version of Python may have it.
-            nearest = find_nearest(alias.name, dir(module))
-            if nearest:
-                message, help_text = f"{home} has no '{alias.name}'", did_you_mean(nearest)
-                self._report(message, help_text, importer, _place_of_name(alias, importer.source))
 
     def _check_member(self, home: str, alias: ast.alias, importer: _Importer) -> None:
         """Check a name that is imported from a module or package of the project."""
@@ -241,6 +223,12 @@ class _Walk:
 
 def _is_of_python(name: str) -> bool:
     return name.partition('.')[0] in sys.stdlib_module_names
+
+
+def _place_of(node: ast.Attribute | ast.alias, source: ModuleSource) -> Span:
+    if isinstance(node, ast.alias):
+        return _place_of_name(node, source)
+    return span_of(Place(source, node))
 
 
 def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:

@@ -155,7 +155,7 @@ class Attributes(Part):
             case Message() | MessageClass():
                 return self._read_message(owner, name)
             case External():
-                return self._evaluator.imports.external(f'{owner.name}.{name}', place)
+                return self._evaluator.imports.external(f'{owner.name}.{name}')
             case ProjectModule():
                 return self._read_module(owner, name)
             case Instance() if name in ('_asdict', '_replace'):
@@ -252,7 +252,7 @@ class Attributes(Part):
             return UNKNOWN
         if self._evaluator.run.modules.is_patched(name):
             return UNKNOWN
-        if name.isupper():
+        if name.isupper() or isinstance(owner, MessageClass):
             if self._evaluator.run.types.may_have_constant(owner.type, name):
                 return UNKNOWN
             known = self._evaluator.run.types.constants(owner.type)
@@ -286,7 +286,7 @@ class Attributes(Part):
             if found is not None:
                 return found
         kind = dict if isinstance(owner, Mapping) else owner.kind
-        if kind is type(None):
+        if kind is type(None) or issubclass(kind, BaseException):
             return UNKNOWN
         kinds = MAPPINGS if isinstance(owner, Mapping) else (kind,)
         if any(hasattr(each, name) for each in kinds):

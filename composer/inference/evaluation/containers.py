@@ -103,9 +103,23 @@ class Containers(Part):
         """Store an entry of a dictionary."""
         owner.set(key, value, place, self._evaluator.run.conditions)
 
+    def check_index(self, owner: Value, index: Value, place: Place) -> None:
+        """Report an index that an array or sequence does not have, whatever is in it."""
+        size = None
+        if isinstance(owner, ArrayField) and owner.type.array == 'fixed':
+            size = owner.type.array_bound
+        elif isinstance(owner, Sequence) and owner.is_whole and owner.kind is tuple:
+            size = len(owner.items)
+        if size is None or not isinstance(index, Constant) or index.kind is not int:
+            return
+        if not -size <= index.value < size:
+            text = f'there is no item {index.value}: this has {size}, from 0 to {size - 1}'
+            self._evaluator.run.report('bad-index', place, text)
+
     def store_item(self, owner: Value, index: Value, value: Value, place: Place) -> None:
         """Store `owner[index] = value`."""
         for each in alternatives(owner):
+            self.check_index(each, index, place)
             match each:
                 case Mapping():
                     if isinstance(index, Constant):

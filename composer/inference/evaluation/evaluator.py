@@ -14,6 +14,7 @@ from composer.inference.evaluation.containers import Containers
 from composer.inference.evaluation.expressions import Expressions
 from composer.inference.evaluation.function_calls import Functions
 from composer.inference.evaluation.imports import Imports
+from composer.inference.evaluation.library.known_values import refusal
 from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
@@ -67,7 +68,7 @@ from composer.inference.values import (
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from composer.inference.current_run import Run
     from composer.python_source.modules import ModuleSource
@@ -185,6 +186,12 @@ class Evaluator:
             return value.result
         return value
 
+    def refuse(self, place: Place, function: Callable[..., object], *arguments: Value) -> None:
+        """Report that Python refuses the types of what a function is called with."""
+        problem = refusal(function, *arguments)
+        if problem is not None:
+            self.run.report('bad-call', place, problem)
+
     def tested(self, node: ast.expr, scope: Scope) -> Value:
         """Return what a condition may be: a coroutine is always true."""
         return self.awaited(node, scope)
@@ -200,6 +207,8 @@ class Evaluator:
             text = 'this is no async generator'
             place = Place(scope.module, node)
             self.run.report('missing-await', place, text, "go through it with 'for'")
+        else:
+            self.refuse(Place(scope.module, node), iter, value)
         return value
 
     @contextmanager

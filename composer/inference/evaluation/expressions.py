@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import operator
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, cast
 
@@ -11,7 +12,15 @@ from composer.inference.evaluation.library.known_values import (
     NotKnownError,
     leaves_of,
 )
-from composer.inference.evaluation.operators import combine, compare, negate, refuses_time
+from composer.inference.evaluation.operators import (
+    OPERATIONS,
+    combine,
+    compare,
+    is_never_equal,
+    negate,
+    refuses_time,
+    type_in_words,
+)
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
 from composer.inference.scopes import Names, Scope, join_names
@@ -38,6 +47,7 @@ from composer.inference.values import (
     join,
     truth_of,
 )
+from composer.python_source.local_names import list_arguments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -168,7 +178,7 @@ class Expressions(Part):
         value = self._evaluator.awaited(chain[-1].left, scope)
         for each in reversed(chain):
             right = self._evaluator.awaited(each.right, scope)
-            self._refuse_time(each.op, value, right, Place(scope.module, each))
+            self.check_operands(each.op, value, right, Place(scope.module, each))
             if isinstance(value, Mapping) and isinstance(right, Mapping):
                 value = self._merge(value, right)
             elif any(isinstance(one, Instance) for one in (value, right)):
@@ -177,9 +187,12 @@ class Expressions(Part):
                 value = combine(each.op, value, right)
         return value
 
-    def _refuse_time(
+    def check_operands(
         self, sign: ast.operator | ast.cmpop, left: Value, right: Value, place: Place
     ) -> None:
+        """Report values that an operator does not take."""
+        if type(sign) in OPERATIONS:
+            self._evaluator.refuse(place, OPERATIONS[type(sign)], left, right)
         if refuses_time(sign, left, right):
             text = 'a time of rclpy is combined only with durations and other times'
             help_text = 'write .nanoseconds, or rclpy.time.Time.from_msg(stamp)'
@@ -206,7 +219,10 @@ class Expressions(Part):
         return Mapping(entries, left.is_open or right.is_open, self._evaluator.run.conditions)
 
     def _unaryop(self, node: ast.UnaryOp, scope: Scope) -> Value:
-        value = negate(node.op, self._evaluator.awaited(node.operand, scope))
+        operand = self._evaluator.awaited(node.operand, scope)
+        if isinstance(node.op, ast.USub):
+            self._evaluator.refuse(Place(scope.module, node), operator.neg, operand)
+        value = negate(node.op, operand)
         if isinstance(value, Constant) and value.origin is not None:
             return constant(value.value, Place(scope.module, node), is_chosen=value.is_chosen)
         return value
@@ -216,7 +232,9 @@ class Expressions(Part):
         chosen = 0
         for sign, operand in zip(node.ops, node.comparators, strict=True):
             right = self.evaluate(operand, scope)
-            self._refuse_time(sign, left, right, Place(scope.module, node))
+            self.check_operands(sign, left, right, Place(scope.module, node))
+            if not self._is_given(node, scope):
+                self.check_equality(sign, left, right, Place(scope.module, node))
             if isinstance(sign, ast.In | ast.NotIn):
                 self._evaluator.attributes.note_containment(
                     left, right, Place(scope.module, node.left)
@@ -228,6 +246,20 @@ class Expressions(Part):
                 return said
             left = right
         return Scalar(bool, chosen)
+
+    def check_equality(self, sign: ast.cmpop, left: Value, right: Value, place: Place) -> None:
+        """Report values that are never equal."""
+        if is_never_equal(sign, left, right):
+            shown = f'{type_in_words(left)} and {type_in_words(right)}'
+            text = f'values of these types are never equal: {shown}'
+            self._evaluator.run.report('never-equal', place, text)
+
+    def _is_given(self, node: ast.Compare, scope: Scope) -> bool:
+        """Return whether a helper compares its own arguments: other calls give it others."""
+        if scope.function is None or len(self._evaluator.functions.active) == 1:
+            return False
+        given = {each.arg for each in list_arguments(scope.function.definition.args)}
+        return any(isinstance(each, ast.Name) and each.id in given for each in ast.walk(node))
 
     def _boolop(self, node: ast.BoolOp, scope: Scope) -> Value:
         """`a and b` comes to `b` if `a` is true; of `a or b`, if `a` is false."""
@@ -310,6 +342,9 @@ class Expressions(Part):
         return Sequence(limits, tuple)
 
     def _item(self, owner: Value, index: Value, place: Place, *, is_slice: bool) -> Value:
+        if not (is_slice or isinstance(owner, Message)):
+            self._evaluator.refuse(place, operator.getitem, owner, index)
+            self._evaluator.containers.check_index(owner, index, place)
         match owner:
             case ArrayField():
                 if is_slice:

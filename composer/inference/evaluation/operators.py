@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 import operator
+from array import array
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
     AGAIN,
+    BY_FILE,
     UNKNOWN,
     ArrayField,
     Class,
@@ -35,7 +37,7 @@ from composer.inference.values import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -49,8 +51,10 @@ _ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.LShift: operator.lshift,
     ast.RShift: operator.rshift,
 }
+_EQUALITIES = (operator.eq, operator.ne)
+_NUMBERS = (bool, int, float)
 _SETS: tuple[type, ...] = (set, frozenset, type({}.keys()))
-_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
     ast.Lt: operator.lt,
@@ -58,10 +62,25 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
 }
+# What raises for values of some types; a text before `%` says itself what it takes.
+OPERATIONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    **{sign: compute for sign, compute in ARITHMETIC.items() if sign is not ast.Mod},
+    **{sign: compare for sign, compare in COMPARISONS.items() if compare not in _EQUALITIES},
+}
+# Values of two of these are never equal.
+_COMPARED = (
+    _NUMBERS,
+    (str,),
+    (bytes, bytearray),
+    (list,),
+    (dict,),
+    (tuple,),
+    (Message,),
+    (array,),
+)
 # What makes a large number of two small ones.
 _POWERS = (ast.Pow, ast.LShift)
 _BITS = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
-_NUMBERS = (bool, int, float)
 # Larger numbers and longer texts are not computed.
 _GREATEST = 2**64
 _LONGEST = 200
@@ -108,7 +127,7 @@ def _refuse_time(sign: ast.operator | ast.cmpop, left: Value, right: Value) -> b
 def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     chosen = chosen_with(left, right)
     if isinstance(left, Constant) and isinstance(right, Constant):
-        compute = _ARITHMETIC.get(type(sign))
+        compute = ARITHMETIC.get(type(sign))
         is_power = isinstance(sign, _POWERS) and abs(hash(right.value)) > _GREATEST_POWER
         if compute and not is_power and _is_small(left.value) and _is_small(right.value):
             try:
@@ -159,7 +178,7 @@ def _combine_sets(sign: ast.operator, left: Sequence, right: Sequence) -> Value:
     known = {item[0]: item for item in items}
     both = [dict.fromkeys(value for value, _ in each.items).keys() for each in (left, right)]
     try:
-        found = _ARITHMETIC[type(sign)](*both)
+        found = ARITHMETIC[type(sign)](*both)
     except (KeyError, TypeError):
         return UNKNOWN
     return Sequence([item for value, item in known.items() if value in found], set)
@@ -217,6 +236,48 @@ def _negate(sign: ast.unaryop, value: Value) -> Value:
     return UNKNOWN
 
 
+def is_never_equal(sign: ast.cmpop, left: Value, right: Value) -> bool:
+    """Return whether two values are of types that are never equal, whatever they are.
+
+    What the file gives may be of another type in another file.
+    """
+    if isinstance(sign, ast.In | ast.NotIn) and isinstance(right, Sequence) and right.is_whole:
+        return bool(right.items) and all(
+            is_never_equal(ast.Eq(), left, item) for item, _ in right.items
+        )
+    kinds = [{_group(each) for each in alternatives(value)} for value in (left, right)]
+    is_known = not any(None in each for each in kinds) and BY_FILE not in map(
+        is_chosen, (left, right)
+    )
+    return isinstance(sign, ast.Eq | ast.NotEq) and is_known and not kinds[0] & kinds[1]
+
+
+def _group(value: Value) -> int | None:
+    kind = type_of(value)
+    return next((at for at, kinds in enumerate(_COMPARED) if kind in kinds), None)
+
+
+def type_of(value: Value) -> type | None:
+    """Return the type that a value has in Python; `Message` for any message."""
+    match value:
+        case Constant() | Scalar() if getattr(value, 'member', None) is None:
+            return value.kind
+        case Sequence() | Mapping() if not value.is_lost:
+            return dict if isinstance(value, Mapping) else value.kind
+        case Message():
+            return Message
+        case ArrayField(is_made=False) if value.type.array != 'fixed' and not value.type.nested:
+            is_list = value.type.kind in ('bool', 'byte', 'string', 'wstring')
+            return list if is_list else array
+    return None
+
+
+def type_in_words(value: Value) -> str:
+    """Return the types that a value may have."""
+    names = (getattr(type_of(each), '__name__', '').lower() for each in alternatives(value))
+    return ' or '.join(dict.fromkeys(names)) or 'these'
+
+
 def compare(sign: ast.cmpop, left: Value, right: Value) -> Value:
     """Return what a comparison says, as far as it is known."""
     known = _compare(sign, left, right)
@@ -244,7 +305,7 @@ def _compare(sign: ast.cmpop, left: Value, right: Value) -> bool | None:
         return None if held is None else held == isinstance(sign, ast.In)
     if isinstance(left, Constant) and isinstance(right, Constant):
         try:
-            return bool(_COMPARISONS[type(sign)](left.value, right.value))
+            return bool(COMPARISONS[type(sign)](left.value, right.value))
         except TypeError:
             return None
     return None

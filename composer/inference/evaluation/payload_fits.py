@@ -16,6 +16,7 @@ from composer.inference.values import (
     Constant,
     External,
     Function,
+    Generated,
     Instance,
     Mapping,
     Message,
@@ -55,6 +56,13 @@ if TYPE_CHECKING:
 
 _FLOATS = ('float32', 'float64')
 _TEXTS = ('string', 'wstring')
+_UNORDERED: tuple[type, ...] = (
+    set,
+    frozenset,
+    type({}.keys()),
+    type({}.values()),
+    type({}.items()),
+)
 
 
 @record
@@ -270,7 +278,7 @@ class _Fit:
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
         match value:
-            case Sequence() if not value.is_lost and value.kind is not set:
+            case Sequence() if not value.is_lost and value.kind not in _UNORDERED:
                 if not value.is_open:
                     yield from self._tried(
                         lambda: check_length(field_type, len(value.items)), place, path
@@ -291,8 +299,8 @@ class _Fit:
                     or (nested[0] and nested[1] and not self.types.are_alike(nested[0], nested[1]))
                 ):
                     yield self._wrong(field_type, value, place, path)
-            case Message() | Mapping():
-                if isinstance(value, Message) or not value.is_lost:
+            case Message() | Mapping() | Sequence() | Generated():
+                if not getattr(value, 'is_lost', False):
                     yield self._wrong(field_type, value, place, path)
 
     def _scalar(
@@ -381,6 +389,8 @@ def _shown(value: Value) -> str:
             return 'dict'
         case Sequence():
             return value.kind.__name__
+        case Generated():
+            return 'a generator, and no list'
         case PartOfNode():
             return f'a {value.name}'
     return type(value).__name__

@@ -14,6 +14,7 @@ from composer.inference.values import (
     Function,
     Instance,
     Place,
+    Scalar,
     Value,
     truth_of,
 )
@@ -62,8 +63,8 @@ class Guards(Part):
             )
             if handler.name:
                 is_own = isinstance(kind, Class)
-                error = Instance(cast('Class', kind), is_unmade=True) if is_own else UNKNOWN
-                scope.set(handler.name, error)
+                error = Instance(cast('Class', kind), is_unmade=True) if is_own else None
+                scope.set(handler.name, error or Scalar(Exception))
             is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
             # What other types have is read where the type at hand never comes to.
             is_other = handler.type is not None and 'AttributeError' in _names_in(handler.type)

@@ -12,6 +12,7 @@ from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.statements.narrowing import doubt_rounds
 from composer.inference.values import (
     UNKNOWN,
+    Alternatives,
     Constant,
     Instance,
     Mapping,
@@ -84,6 +85,9 @@ class MatchCases(Part):
         match pattern:
             case ast.MatchValue():
                 value = self._evaluator.evaluate(pattern.value, scope)
+                place = Place(scope.module, pattern.value)
+                if not isinstance(subject, Alternatives):
+                    self._evaluator.expressions.check_equality(ast.Eq(), subject, value, place)
                 return truth_of(compare(ast.Eq(), subject, value)), subject
             case ast.MatchSingleton():
                 return truth_of(compare(ast.Is(), subject, constant(pattern.value))), subject

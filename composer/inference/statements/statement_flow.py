@@ -154,6 +154,8 @@ class Statements(Part):
         if isinstance(before, Sequence):
             self._evaluator.containers.extend(before, value, Place(scope.module, node.value))
             return
+        place = Place(scope.module, node.value)
+        self._evaluator.expressions.check_operands(node.op, before, value, place)
         self.store(node.target, combine(node.op, before, value), scope)
 
     def _delete(self, node: ast.Delete, scope: Scope) -> None:

@@ -49,10 +49,13 @@ from collections import Counter, OrderedDict, defaultdict, deque, namedtuple
 from types import SimpleNamespace
 import copy
 import dataclasses
+import datetime
 import functools
 import itertools
 import math
+import pathlib
 import random
+import rclpy.duration
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
@@ -160,6 +163,33 @@ WRONG = {
     "p = {}; p['liner'] = 1; node.publish('command', p)": 'unknown-field',
     "Keeper(node).go({'liner': {}})": 'unknown-field',
     "node.publish('level', 'high')": 'field-type',
+    # values that Python, or rclpy, does not take
+    "node.publish('scan', {'ranges': map(float, range(3))})": 'field-type',
+    "node.publish('scan', {'ranges': {1.0}})": 'field-type',
+    "node.publish('scan', {'ranges': (x for x in range(3))})": 'field-type',
+    "print('x: ' + m.pose.pose.position.x)": 'bad-call',
+    'print(1.0 - m.child_frame_id)': 'bad-call',
+    'print(-m.child_frame_id)': 'bad-call',
+    'print(m.pose.pose.position * 2)': 'bad-call',
+    'total = 0; total += m.child_frame_id': 'bad-call',
+    'print(m.child_frame_id > 3)': 'bad-call',
+    'print(math.sqrt(m.child_frame_id))': 'bad-call',
+    'print(len(m.pose.pose.position.x))': 'bad-call',
+    "print(','.join([m.pose.pose.position.x]))": 'bad-call',
+    'print(m.child_frame_id.split(1))': 'bad-call',
+    'for i in range(m.pose.pose.position.x): print(i)': 'bad-call',
+    'for each in m.pose: print(each)': 'bad-call',
+    "print(m.child_frame_id['a'])": 'bad-call',
+    'print(m.pose.covariance[36])': 'bad-index',
+    'm.pose.covariance[-37] = 1.0': 'bad-index',
+    'print((1, 2)[2])': 'bad-index',
+    'print(m.child_frame_id == 1)': 'never-equal',
+    'print(m == m.child_frame_id)': 'never-equal',
+    'print(m.pose.pose.position.x in ("a", "b"))': 'never-equal',
+    "node.publish('level', datetime.timedelta(seconds=1))": 'field-type',
+    "node.publish('scan', {'header': {'frame_id': pathlib.Path('/tmp')}})": 'field-type',
+    "node.publish('scan', {'header': {'frame_id': ValueError('x')}})": 'field-type',
+    "node.publish('level', rclpy.duration.Duration(seconds=1))": 'field-type',
     "node.publish('level', 256)": 'field-range',
     "node.publish('level', m.pose.pose.position.x)": 'field-type',
     "node.publish('level', 'x' if m.pose else 1)": 'field-type',
@@ -305,7 +335,6 @@ RIGHT = [
     'print(BatteryState.POWER_SUPPLY_STATUS_FULL, LaserScan().ranges)',
     'setattr(node.state, m.child_frame_id, 1); print(node.state.anything)',
     "node.logger.info('late', throttle_duration_sec=1.0)",
-    "node.publish('scan', {'ranges': map(float, range(3))})",
     "kept = node.call_async('enable', True); await kept",
     'await asyncio.sleep(0)',
     'asyncio.run(run_beside(node))',

@@ -9,9 +9,14 @@ import operator
 import re
 import struct
 from collections import ChainMap, Counter, OrderedDict, defaultdict, deque
+from datetime import date, datetime, timedelta
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import UUID
 
-from composer.inference.values import NONE, Scalar, Value
+from composer.inference.values import NONE, PartOfNode, Scalar, Value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,11 +46,25 @@ _BY_TYPE: dict[type, str] = {
     'textwrap.dedent textwrap.fill textwrap.indent textwrap.shorten time.asctime time.ctime '
     'time.strftime',
     bytes: 'builtins.bytes os.urandom pickle.dumps struct.pack',
+    Path: 'pathlib.Path pathlib.Path.cwd pathlib.Path.home pathlib.PurePath',
+    datetime: 'datetime.datetime datetime.datetime.now datetime.datetime.fromtimestamp '
+    'datetime.datetime.utcnow datetime.datetime.today datetime.datetime.fromisoformat',
+    date: 'datetime.date datetime.date.today',
+    timedelta: 'datetime.timedelta',
+    UUID: 'uuid.UUID uuid.uuid1 uuid.uuid3 uuid.uuid4 uuid.uuid5',
+    Decimal: 'decimal.Decimal',
+    Fraction: 'fractions.Fraction',
+    **{
+        each: f'builtins.{each.__name__}'
+        for each in vars(builtins).values()
+        if isinstance(each, type) and issubclass(each, Exception)
+    },
 }
 KNOWN_RESULTS: dict[str, Value] = {
     name: Scalar(kind) for kind, names in _BY_TYPE.items() for name in names.split()
 }
 KNOWN_RESULTS |= {'builtins.print': NONE, 'time.sleep': NONE}
+KNOWN_RESULTS['rclpy.duration.Duration'] = PartOfNode('duration')
 CONSTANTS: dict[str, float | str] = {
     **{f'math.{name}': getattr(math, name) for name in ('pi', 'e', 'tau', 'inf', 'nan')},
     **{
@@ -109,6 +128,10 @@ COMPUTED: dict[str, Callable[..., Any]] = {
     'struct.calcsize': struct.calcsize,
     'struct.pack': struct.pack,
     'struct.unpack': struct.unpack,
+}
+TAKING: dict[str, Callable[..., Any]] = {
+    **{f'builtins.{each.__name__}': each for each in (enumerate, iter, range, zip)},
+    'time.sleep': lambda seconds: range(0) if seconds < 0 else None,
 }
 # Called with containers whose items may be anything.
 ARRANGED: dict[str, Callable[..., Any]] = {

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, product
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
     NONE,
+    ArrayField,
     Constant,
     Generated,
     Mapping,
+    Message,
     Place,
+    Scalar,
     Sequence,
     Value,
+    alternatives,
     constant,
+    is_none,
     join,
 )
 
@@ -34,6 +41,10 @@ _BUILDERS: dict[type, Callable[[Any], Any]] = {
 _KEYS: tuple[type, ...] = (type({}.keys()), type({}.values()), type({}.items()))
 
 _CONTAINERS: Any = (*_BUILDERS, *_KEYS, Iterator)
+_SAMPLES: dict[type, Any] = {bool: True, int: 1, float: 1.0, str: '1', bytes: b'1'}
+_CODES = {'float32': 'f', 'float64': 'd'}
+_MOST_TRIED = 4
+_MESSAGE = type('message', (), {})()
 
 
 class NotKnownError(Exception):
@@ -83,6 +94,47 @@ def arrange(function: Callable[..., Any], arguments: Iterable[Value], place: Pla
         else:
             given.append(leaves_of(value, place))
     return made.call_plainly(function, *given)
+
+
+def refusal(function: Callable[..., Any], *arguments: Value) -> str | None:
+    """Return Python's own words if it refuses the types of some values, whatever they are."""
+    several = [[each for each in alternatives(value) if not is_none(each)] for value in arguments]
+    if not all(several) or prod(map(len, several)) > _MOST_TRIED:
+        return None
+    found = {_refusal(function, *each) for each in product(*several)}
+    return None if None in found else min(filter(None, found))
+
+
+def _refusal(function: Callable[..., Any], *arguments: Value) -> str | None:
+    try:
+        function(*map(_sample, arguments))
+    except TypeError as error:
+        return str(error)
+    except Exception:  # noqa: BLE001
+        return None
+    return None
+
+
+def _sample(value: Value) -> Any:
+    """Return some value of the same type.
+
+    Raises:
+        NotKnownError: The type is not known.
+    """
+    match value:
+        case Constant() | Scalar() if value.kind in _SAMPLES and not getattr(value, 'member', 0):
+            return _SAMPLES[value.kind]
+        case Scalar() if issubclass(value.kind, BaseException):
+            return value.kind()
+        case Sequence() if value.items and not value.is_lost and value.kind in _BUILDERS:
+            return _BUILDERS[value.kind](_sample(item) for item, _ in value.items[:_MOST_TRIED])
+        case Message():
+            return _MESSAGE
+        case ArrayField() if value.type.array != 'fixed' and not value.type.nested:
+            if value.type.kind in ('string', 'wstring'):
+                return ['1']
+            return array(_CODES.get(value.type.kind, 'b'), [1])
+    raise NotKnownError
 
 
 class Computation:

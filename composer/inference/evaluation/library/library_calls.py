@@ -16,6 +16,7 @@ from composer.inference.evaluation.library.known_functions import (
     ARRANGED,
     COMPUTED,
     KNOWN_RESULTS,
+    TAKING,
 )
 from composer.inference.evaluation.library.known_values import (
     Computation,
@@ -109,6 +110,7 @@ class LibraryCalls(Part):
         known = self._compute(name, arguments, place)
         if known is not None:
             return known
+        self.refuse(COMPUTED.get(name) or TAKING.get(name), arguments, place)
         if name in self._handlers:
             return self._handlers[name](arguments, place)
         if name.startswith(_OF_TEXTS) and arguments.positional and not arguments.is_open:
@@ -139,6 +141,14 @@ class LibraryCalls(Part):
                 case Sequence(items=[(Awaitable(), where), *_]):
                     text = 'this is a coroutine, which has not been awaited'
                     self._evaluator.run.report('missing-await', where, text, 'put await before it')
+
+    def refuse(
+        self, function: Callable[..., Any] | None, arguments: Arguments, place: Place
+    ) -> None:
+        """Report that a function of Python does not take values of the types of the arguments."""
+        if function is not None and not (arguments.named or arguments.is_open):
+            given = [each.value for each in arguments.positional]
+            self._evaluator.refuse(place, function, *given)
 
     def _compute(self, name: str, arguments: Arguments, place: Place) -> Value | None:
         """Return what a function returns if all that it is given is known."""

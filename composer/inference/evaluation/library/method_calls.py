@@ -110,6 +110,7 @@ class MethodCalls(Part):
             known: Value | None = self._evaluator.library.compute(call_method(name), whole, place)
             if known is not None:
                 return known
+            self._evaluator.library.refuse(call_method(name), whole, place)
         self._evaluator.calls.escape_all(arguments)
         if result is list:
             return Sequence([(Scalar(str), place)], list, is_open=True, origin=place)

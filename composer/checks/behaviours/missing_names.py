@@ -1,0 +1,237 @@
+"""Names that modules of Python, of installed packages and of messages do not have.
+
+All code of a module is looked at, wherever it stands. Nothing is imported: modules of Python that
+are loaded already are asked, and of others, a name is missing if it is no word of their source.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from composer.inference.message_types import PARTS, in_python
+from composer.python_source.annotations import dotted_name, find_interface
+from composer.python_source.modules import ModuleSource
+from composer.python_source.syntax import list_nodes
+from composer.records import record
+from composer.spelling import find_nearest, suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from composer.checks.context import CheckContext
+    from composer.interfaces.catalogue import InterfaceKind
+
+KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+# What a test mentions that asks what there is.
+_ASKING = {'hasattr', 'version_info', '__version__', 'platform', 'implementation'}
+_CATCHING = {'AttributeError', 'ImportError', 'ModuleNotFoundError', 'NameError', 'Exception'}
+# A module with one of these words may have names that are not in its source.
+_OPEN = re.compile(
+    r'^def __getattr__|import \*|\bglobals\(|sys\.modules\[__name__\]', re.MULTILINE
+)
+_WORD = re.compile(r'\b[A-Za-z]\w*')
+_OF_CLASSES = {'get_fields_and_field_types', 'SLOT_TYPES', 'Event', *PARTS}
+
+
+@record
+class MissingName:
+    """A name that is not where the code looks for it.
+
+    Attributes:
+        node: What names it: an attribute, or a part of an import.
+    """
+
+    rule: str
+    node: ast.Attribute | ast.alias
+    message: str
+    help: str | None
+
+
+@dataclass(slots=True)
+class Library:
+    """What the modules have that are not of the project, each read once."""
+
+    context: CheckContext
+    _texts: dict[str, str] = field(default_factory=dict)
+
+    def find_missing(self, module: ModuleSource) -> Iterator[MissingName]:
+        """Yield the names that the code of a module uses, and that do not exist."""
+        nodes = list_nodes(module.body)
+        imports = _imports_of(nodes)
+        stored = {node.attr for node in _attributes(nodes, ast.Store)}
+        asked = set(map(id, _asked_first(nodes)))
+        for node in nodes:
+            if id(node) in asked:
+                continue
+            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                for alias in node.names:
+                    yield from self._explain('missing-module', node.module, alias.name, alias)
+            elif isinstance(node, ast.Attribute) and node.attr not in stored:
+                first, dot, rest = dotted_name(node.value).partition('.')
+                if first in imports:
+                    owner = imports[first] + dot + rest
+                    yield from self._explain('unknown-attribute', owner, node.attr, node)
+
+    def _explain(
+        self, rule: str, owner: str, name: str, node: ast.Attribute | ast.alias
+    ) -> Iterator[MissingName]:
+        """Yield what is wrong with a name, if that is certain."""
+        if name.startswith('_') or name == '*':
+            return
+        interface = find_interface(owner)
+        package = owner.partition('.')[0]
+        if interface is not None:
+            found = self._missing_in_class(interface, name)
+            rule = 'unknown-field'
+        elif package in self.context.catalogue.packages():
+            found = self._missing_in_package(owner, name)
+            rule = 'missing-module'
+        elif self.context.modules.is_of_project(package) and package != 'composer':
+            return
+        else:
+            found = self._missing_in_module(owner, name)
+        if found is not None:
+            yield MissingName(rule, node, *found)
+
+    def _missing_in_class(self, interface: str, name: str) -> tuple[str, str | None] | None:
+        types = self.context.types
+        description = types.describe(interface)
+        if description is None or name in _OF_CLASSES or types.may_have_constant(interface, name):
+            return None
+        if description.field(name) is not None:
+            return None
+        known = types.constants(interface)
+        return f"{in_python(interface)} has no constant '{name}'", suggest(name, known, 'it has')
+
+    def _missing_in_package(self, owner: str, name: str) -> tuple[str, str | None] | None:
+        """Return what is wrong with a name of `std_msgs`, or of `std_msgs.msg`."""
+        catalogue = self.context.catalogue
+        package, _, kind = owner.partition('.')
+        kinds = [each for each in KINDS if catalogue.names(each, package)]
+        full = [f'{package}/{each}/{name}' for each in KINDS]
+        elsewhere = [f'{other}/{kind}/{name}' for other in catalogue.packages()]
+        if not kind:
+            if name in KINDS or self.context.modules.has(f'{owner}.{name}') or not kinds:
+                return None
+            found = [each.rpartition('/')[0] for each in full if catalogue.has(each)]
+            known: Iterable[str] = kinds
+        elif kind in KINDS and name[:1].isupper():
+            names = catalogue.names(kind, package)
+            known = {each.rpartition('/')[2] for each in names}
+            # The parts of services and actions are called `SetBool_Request` and the like.
+            if name.partition('_')[0] in known:
+                return None
+            found = [each for each in (*full, *elsewhere) if catalogue.has(each)]
+        else:
+            return None
+        meant = f"did you mean '{found[0].replace('/', '.')}'?" if found else suggest(name, known)
+        return f"{owner} has no '{name}'", meant
+
+    def _missing_in_module(self, owner: str, name: str) -> tuple[str, str | None] | None:
+        loaded = _loaded(owner) if _is_of_python(owner) else None
+        modules = self.context.modules
+        if loaded is not None:
+            is_there, known = hasattr(loaded, name), dir(loaded)
+        else:
+            text = self._text_of(owner)
+            is_there = not text or re.search(rf'\b{re.escape(name)}\b', text) is not None
+            words = [] if is_there else _WORD.findall(text)
+            known = [each for each in words if each[0].isupper() == name[0].isupper()]
+        if is_there or (isinstance(loaded, type(sys) | None) and modules.has(f'{owner}.{name}')):
+            return None
+        nearest = find_nearest(name, known)
+        if nearest is None and not find_spec('rclpy'):
+            # The Python that runs the system may be another one, and have it.
+            return None
+        return f"{owner} has no '{name}'", suggest(name, known)
+
+    def _text_of(self, name: str) -> str:
+        """Return the source of a module, or of its stubs; empty if it does not tell all names."""
+        if name not in self._texts:
+            found = self.context.modules.find(name) if self.context.modules.has(name) else None
+            path = found.path if isinstance(found, ModuleSource) else None
+            text = ''
+            if path is not None and path.suffix == '.py':
+                stubs = path.with_suffix('.pyi')
+                text = (stubs if stubs.is_file() else path).read_text(errors='replace')
+            is_open = _OPEN.search(text) and name != 'composer'
+            self._texts[name] = '' if is_open else text
+        return self._texts[name]
+
+
+def _loaded(full_name: str) -> object:
+    """Return a module or class of Python; `None` if it is not loaded, or something else."""
+    found: object = None
+    for part in full_name.split('.'):
+        within = sys.modules.get(part) if found is None else getattr(found, part, None)
+        if not isinstance(within, type(sys) | type):
+            return None
+        found = within
+    return found
+
+
+def _is_of_python(name: str) -> bool:
+    return name.partition('.')[0] in sys.stdlib_module_names
+
+
+def _attributes(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> list[ast.Attribute]:
+    return [
+        each for each in nodes if isinstance(each, ast.Attribute) and isinstance(each.ctx, context)
+    ]
+
+
+def _imports_of(nodes: Iterable[ast.AST]) -> dict[str, str]:
+    """Return the full names of what imports store, of names that nothing else stores."""
+    found: dict[str, set[str]] = {}
+    for node in nodes:
+        match node:
+            case ast.Import():
+                for alias in node.names:
+                    first = alias.name.partition('.')[0]
+                    meant = alias.name if alias.asname else first
+                    found.setdefault(alias.asname or first, set()).add(meant)
+            case ast.ImportFrom(module=str(home), level=0):
+                for alias in node.names:
+                    meant = f'{home}.{alias.name}'
+                    found.setdefault(alias.asname or alias.name, set()).add(meant)
+            case ast.ImportFrom():
+                for alias in node.names:
+                    found.setdefault(alias.asname or alias.name, set()).add('')
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                found.setdefault(name, set()).add('')
+            case (
+                ast.FunctionDef(name=name)
+                | ast.AsyncFunctionDef(name=name)
+                | ast.ClassDef(name=name)
+                | ast.ExceptHandler(name=str(name))
+                | ast.MatchAs(name=str(name))
+                | ast.MatchStar(name=str(name))
+            ):
+                found.setdefault(name, set()).add('')
+    return {name: min(full) for name, full in found.items() if len(full) == 1 and min(full)}
+
+
+def _asked_first(nodes: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """Yield what is read only where something has asked whether it is there."""
+    for node in nodes:
+        match node:
+            case ast.Try() | ast.TryStar():
+                types = [each.type for each in node.handlers]
+                if None in types or _words(types) & _CATCHING:
+                    yield from list_nodes(node.body)
+            case ast.If() | ast.IfExp() | ast.While():
+                if _words([node.test]) & _ASKING:
+                    yield from ast.walk(node)
+            case ast.BoolOp() if _words(node.values) & _ASKING:
+                yield from ast.walk(node)
+
+
+def _words(nodes: Iterable[ast.AST | None]) -> set[str]:
+    """Return the names and attributes in some expressions."""
+    every = [inner for node in nodes if node is not None for inner in ast.walk(node)]
+    return {str(getattr(each, 'id', None) or getattr(each, 'attr', '')) for each in every}

@@ -1,0 +1,2 @@
+def watch(node, message):
+    node.logger.info(f'yaw: {message.orientation_covariance[8]}')

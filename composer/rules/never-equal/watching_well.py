@@ -1,0 +1,3 @@
+def watch(node, message):
+    if message.level == message.ERROR:
+        node.logger.error(message.message)
