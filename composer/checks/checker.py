@@ -146,7 +146,11 @@ def create_context(
     if system.spec is None:
         return None
     interfaces = load_declared(system, installed)
-    modules = ModuleFinder(project_search_path(system.files), before.modules if before else None)
+    modules = ModuleFinder(
+        project_search_path(system.files),
+        before.modules if before else None,
+        {*system.spec.interfaces, *(system.unused.interfaces if system.unused else ())},
+    )
     return CheckContext(system, system.spec, interfaces, modules)
 
 

@@ -16,6 +16,7 @@ from composer.names import (
     find_topic_name_problem,
     with_article,
 )
+from composer.python_source.modules import ModuleSource
 from composer.spelling import did_you_mean
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ _LONGEST_OWN_SERVICES = {
 def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check every name that ROS gets."""
     yield from _check_namespaces(context)
+    yield from _check_interface_packages(context)
     for node in context.spec.nodes.values():
         problem = find_node_name_problem(node.name)
         if problem:
@@ -58,6 +60,19 @@ def check_names(context: CheckContext) -> Iterator[Diagnostic]:
     for process in context.spec.processes.values():
         for declared in process.nodes:
             yield from _check_declared(context, declared)
+
+
+def _check_interface_packages(context: CheckContext) -> Iterator[Diagnostic]:
+    for package in context.spec.interfaces:
+        if context.modules.is_of_project(package):
+            module = context.modules.find(package)
+            path = module.path if isinstance(module, ModuleSource) else None
+            yield context.at_key(
+                ('interfaces', package),
+                _RULE,
+                f"'{package}': Python finds '{path}' before the interface package",
+                help='remove this file, or give it another name',
+            )
 
 
 def _check_declared(context: CheckContext, node: DeclaredNodeSpec) -> Iterator[Diagnostic]:

@@ -97,7 +97,10 @@ class _Sources:
         if isinstance(module, ModuleSource) and module.syntax_error and not module.lines:
             # It cannot be read, and an import of it has to fail.
             return f'raise ImportError({module.syntax_error!r})\n'
-        return '' if isinstance(module, MissingModule) else '\n'.join(module.lines) + '\n'
+        if isinstance(module, MissingModule) or module.path is None or module.unread:
+            # An import finds it as Python does.
+            return ''
+        return '\n'.join(module.lines) + '\n'
 
     def _imports(self, name: str) -> tuple[str, ...]:
         if name not in self._imported:

@@ -16,7 +16,7 @@ from composer.records import record
 from composer.spelling import find_nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
 
 @record
@@ -65,10 +65,18 @@ class ModuleFinder:
 
     Args:
         before: A finder whose modules are kept where their source is the same.
+        interfaces: The interface packages that the project declares. A folder of this name has
+            their definitions: Python finds the package that is built of these.
     """
 
-    def __init__(self, search_path: list[Path], before: ModuleFinder | None = None) -> None:
+    def __init__(
+        self,
+        search_path: list[Path],
+        before: ModuleFinder | None = None,
+        interfaces: Collection[str] = (),
+    ) -> None:
         self._project = search_path
+        self._interfaces = interfaces
         self._before = before.list_read(search_path) if before else {}
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
@@ -126,7 +134,8 @@ class ModuleFinder:
         top = name.partition('.')[0]
         if top not in self._is_own:
             file, folders = _locate(top, self._roots)
-            found = [*([file] if file else []), *folders[:1]]
+            is_built = file is None and top in self._interfaces
+            found = [] if is_built else [*([file] if file else []), *folders[:1]]
             # Python asks no folder for these, whatever is there.
             is_built_in = top in sys.builtin_module_names
             self._is_own[top] = not is_built_in and any(

@@ -155,6 +155,7 @@ def make_importable(package: str, prefix: Path) -> None:
     if str(folder) not in sys.path:
         sys.path.append(str(folder))
         importlib.invalidate_caches()
+    _forget_definitions(package)
     origin = _find_origin(package)
     if origin != folder / package / '__init__.py':
         message = (
@@ -171,6 +172,14 @@ def make_importable(package: str, prefix: Path) -> None:
 def _is_other_build(entry: Path, folder: Path, package: str) -> bool:
     is_build = entry != folder and (entry.parent / BUILD_MANIFEST).exists()
     return is_build and (entry / package).is_dir()
+
+
+def _forget_definitions(package: str) -> None:
+    """Forget the folder of a package's definitions: an import before the build has taken it."""
+    loaded = sys.modules.get(package)
+    if loaded is not None and loaded.__spec__ and loaded.__spec__.origin is None:
+        for name in [each for each in sys.modules if f'{each}.'.startswith(f'{package}.')]:
+            del sys.modules[name]
 
 
 def _find_origin(package: str) -> Path | None:

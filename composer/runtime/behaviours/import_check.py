@@ -8,6 +8,9 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any
 
 from composer.checks.behaviours.behaviour_functions import check_behaviour_call
+from composer.diagnostics import diagnostic_at
+from composer.errors import ComposerError
+from composer.interfaces.declared_packages import import_declared
 from composer.language.bindings import system_bindings
 from composer.runtime.behaviours import callables as behaviours
 
@@ -68,6 +71,12 @@ class ImportCheck:
 
     def __call__(self, context: CheckContext, found: list[Diagnostic]) -> Iterator[Diagnostic]:
         """Yield findings about the functions, except where their source already has findings."""
+        try:
+            _import_interfaces(context)
+        except ComposerError as error:
+            span = context.system.positions.key(('interfaces',))
+            yield diagnostic_at(span, 'broken-behaviour', str(error), help=error.help)
+            return
         with _own_modules(context):
             was_told = any(each.rule == 'missing-module' for each in found)
             for binding in system_bindings(context.spec):
@@ -95,6 +104,21 @@ class ImportCheck:
                 yield _explain(context, binding, error)
             return
         yield from check_behaviour_call(context, binding, *behaviours.shape_of(function))
+
+
+def _import_interfaces(context: CheckContext) -> None:
+    """Build the interface packages that the file declares, as a start does.
+
+    Raises:
+        ComposerError: One of them cannot be built or imported.
+    """
+    # What has errors is reported already, and without ROS nothing can be built.
+    if context.catalogue.available and not context.interfaces.unreadable:
+        import_declared(context.interfaces, _show_progress)
+
+
+def _show_progress(line: str) -> None:
+    sys.stderr.write(f'{line}\n')
 
 
 def _explain(
@@ -141,7 +165,8 @@ def _own_modules(context: CheckContext) -> Iterator[None]:
 
     before = set(sys.modules)
     names = {
-        binding.behaviour.module.partition('.')[0] for binding in system_bindings(context.spec)
+        *(each.behaviour.module.partition('.')[0] for each in system_bindings(context.spec)),
+        *context.spec.interfaces,
     }
     with behaviours.project_on_path(project_search_path(context.system.files)):
         yield

@@ -240,6 +240,16 @@ def test_a_package_can_be_imported_from_now_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures('own_path')
+def test_a_folder_of_definitions_that_was_imported_before_is_forgotten(tmp_path: Path) -> None:
+    (tmp_path / 'known_robots' / 'msg').mkdir(parents=True)
+    sys.path.insert(0, str(tmp_path))
+    __import__('known_robots.msg')
+    prefix = write_module(tmp_path / 'built', 'known_robots')
+    make_importable('known_robots', prefix)
+    assert __import__('known_robots').place == str(prefix)
+
+
+@pytest.mark.usefixtures('own_path')
 def test_a_module_that_has_the_name_is_an_error(tmp_path: Path) -> None:
     prefix = write_module(tmp_path, 'json')
     with pytest.raises(ModuleTakenError) as caught:
