@@ -1,6 +1,7 @@
 """`ComposerExecutor`: rclpy's multi-threaded executor at a cost that does not grow."""
 
 import atexit
+import gc
 import os
 import threading
 import warnings
@@ -23,6 +24,7 @@ from composer.executor.tasks import ExecutorTask, ImmediateCallback, ScheduledTa
 from composer.executor.wait_set_thread import WaitSetThread
 
 _MAX_THREADS = 256
+_FEW_EXECUTORS = 32
 _NEVER_CALLED = (
     '_make_handler',
     '_take_client',
@@ -61,13 +63,17 @@ class ComposerExecutor(MultiThreadedExecutor):
     """
 
     calls_immediately = True
+    _is_ended = True  # Until it has been made.
 
     def __init__(self, num_threads: int | None = None, *, context: Any = None) -> None:
-        super().__init__(num_threads, context=context)  # Its pool is never used.
+        # Its pool is never used, and it would warn of one with a single thread.
+        _collect_garbage()
+        super().__init__(2 if num_threads in (None, 1) else num_threads, context=context)
         self.is_forked = False
         self.has_own_rules = type(self).can_execute is not ComposerExecutor.can_execute
         self._spinner = self._create_spinner(num_threads or _MAX_THREADS)
         _executors.add(self)
+        self._is_ended = False
 
     def _create_spinner(self, max_running: int) -> Spinner:
         """Return what is behind all methods."""
@@ -103,7 +109,8 @@ class ComposerExecutor(MultiThreadedExecutor):
     def call_later(self, delay_sec: float, callback: Callable[[], Any]) -> DelayedCall:
         """Add a callback like `create_task`, `delay_sec` from now; it can be cancelled."""
         deadlines = self._spinner.poller.deadlines
-        return DelayedCall(deadlines, delay_sec, lambda: self.create_task(callback))
+        executor = weakref.proxy(self)  # What waits must not keep it.
+        return DelayedCall(deadlines, delay_sec, lambda: executor.create_task(callback))
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
@@ -246,6 +253,7 @@ class ComposerExecutor(MultiThreadedExecutor):
             return False
         with self._nodes_lock:
             self._nodes: set[Any] = set()
+        self._is_ended = True
         self._spinner.tear_down(wait_for_threads=wait_for_threads)
         with self._shutdown_lock:
             for guard in (self._guard, self._sigint_gc):
@@ -266,12 +274,13 @@ class ComposerExecutor(MultiThreadedExecutor):
         Then end the threads: rclpy aborts a process that exits while one of them waits in it.
         """
         self._is_shutdown = True
+        self._is_ended = True  # A thread that is left may hold a lock for ever.
         self._spinner.stop(None)
         self._spinner.wait_set_thread.close()
 
     def leave_to_parent(self) -> None:
         """Refuse to spin and destroy nothing: this is a forked child."""
-        self.is_forked = self._is_shutdown = True
+        self.is_forked = self._is_shutdown = self._is_ended = True
         _kept_for_parent.append((self._spinner, self._sigint_gc))
         self._spinner.leave_to_parent()
         refused: Any = RefusedSpinner()
@@ -280,9 +289,16 @@ class ComposerExecutor(MultiThreadedExecutor):
         self._nodes = set()
 
     def __del__(self) -> None:
-        """Do what rclpy does; `__init__` may have failed half-way."""
+        """Free all that the executor has, if nobody has shut it down.
+
+        No thread that waits refers to it, so this comes as soon as nobody else does. `__init__`
+        may have failed half-way.
+        """
         with suppress(AttributeError, InvalidHandle, ValueError):
-            super().__del__()
+            if self._is_ended:
+                super().__del__()
+            else:
+                ComposerExecutor.shutdown(self, 0, wait_for_threads=False)
 
 
 def _is_over(future: Any) -> Callable[[], bool]:
@@ -292,6 +308,18 @@ def _is_over(future: Any) -> Callable[[], bool]:
 # Held while a node leaves one executor for another: two threads may move the same node.
 _moving = threading.RLock()
 _executors: weakref.WeakSet[ComposerExecutor] = weakref.WeakSet()
+_most_executors = _FEW_EXECUTORS
+
+
+def _collect_garbage() -> None:
+    """Free executors that only their own nodes refer to, before they use up all descriptors.
+
+    Python does that too seldom: it counts objects, of which an executor has few.
+    """
+    global _most_executors  # noqa: PLW0603
+    if len(_executors) >= _most_executors:
+        gc.collect()
+        _most_executors = max(_FEW_EXECUTORS, 2 * len(_executors))
 
 
 @atexit.register

@@ -3,6 +3,7 @@
 import heapq
 import itertools
 import threading
+import weakref
 from collections import deque
 from collections.abc import Callable
 from time import monotonic_ns
@@ -37,9 +38,14 @@ class JumpingClock:
         self.clock = clock
         self.followers: set[Any] = set()
         self._deadlines = deadlines
-        self._handle = clock.create_jump_callback(_ANY_JUMP, post_callback=self._on_jump)
+        # The clock keeps it where Python's garbage collector does not look.
+        me = weakref.proxy(self)
+        self._handle = clock.create_jump_callback(
+            _ANY_JUMP, post_callback=lambda _: me.note_jump()
+        )
 
-    def _on_jump(self, _: object) -> None:
+    def note_jump(self) -> None:
+        """Have the followers rearmed."""
         self._deadlines.jumped.append(self)
         self._deadlines.wake()
 
@@ -59,7 +65,7 @@ class Deadlines:
         self.timer = self._create_timer()
         self.jumped: deque[JumpingClock] = deque()
         self.wake = wake
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # A finalizer may end the executor.
         # Lists of a deadline, a number and what is timed; None in its place if that is replaced.
         self._heap: list[list[Any]] = []
         self._entries: dict[Timed, list[Any]] = {}

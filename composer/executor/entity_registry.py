@@ -78,6 +78,10 @@ class EntityRegistry:
         """Return when what only the wait set thread sees is queued, if it was triggered before."""
         self._wait_set_thread.flush_if_used()
 
+    def rest(self) -> None:
+        """Have the wait set thread see that nobody spins any more, if that is so."""
+        self._wait_set_thread.wake()
+
     def refresh(self) -> None:
         """Listen to all entities of the executor's nodes, and to nothing else."""
         with self._lock:

@@ -1,5 +1,6 @@
 """The leader's loop, and how what it finds is executed: callbacks, coroutines and tasks."""
 
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic
@@ -30,6 +31,21 @@ ENDED: Final = object()
 DEFERRED: Final = object()
 
 
+def weakly(method: Callable[..., Any]) -> Callable[..., None]:
+    """Return a function that calls `method` as long as its object is there, and does not keep it.
+
+    A thread with nothing to do keeps neither the executor nor the nodes, which refer to it.
+    """
+    reference = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> None:
+        bound = reference()
+        if bound is not None:
+            bound(*arguments)
+
+    return call
+
+
 class EventLoop:
     """What the leader does, whichever worker leads: look for events and execute what is ready.
 
@@ -54,7 +70,7 @@ class EventLoop:
         notify: Callable[[], None],
         workers: Callable[..., WorkerThreads],
     ) -> None:
-        self.workers = workers(self._lead, self._on_takeover, on_error)
+        self.workers = workers(weakly(self._lead), weakly(self._on_takeover), on_error)
         self.watchers: set[object] = set()
         self._parts = parts
         self._registry = registry
@@ -64,24 +80,39 @@ class EventLoop:
         self._refresh_later: DelayedCall | None = None
 
     def _lead(self, me: Worker) -> None:
-        """Lead until nobody spins, or another worker leads."""
-        workers, scheduler, poller = self.workers, self._parts.scheduler, self._parts.poller
+        """Lead until nobody spins, or another worker leads.
+
+        The executor is held except in a wait: it is not finalized while its locks are held.
+        """
+        executor: Any = None
         try:
             while self._goes_on(me):
-                execute = self._look if scheduler.unlooked else self._execute_ready
-                if execute(me) or scheduler.running:
-                    if not self._is_spinning() or poller.peek() or not self._is_idle():
-                        continue
-                    if scheduler.running:
-                        workers.let_standby_sleep(me)
-                if workers.leader is me:
-                    poller.wait_if(self._is_idle)
-                    if self._is_spinning():
-                        poller.peek()
+                executor = self._parts.executor
+                if executor is not None and self._execute_all(me):
+                    executor = None
+                    self._parts.poller.wait_if(self._is_idle)
+                    executor = self._parts.executor
+                    if executor is not None and self._is_spinning():
+                        self._parts.poller.peek()
+                executor = None
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
-            workers.stop_leading(me)  # Whoever spins on starts another leader.
+            self.workers.stop_leading(me)  # Whoever spins on starts another leader.
             self._on_error(error)
+        executor = None
+        if self.workers.leader is None:
+            self._registry.rest()
         self._notify()
+
+    def _execute_all(self, me: Worker) -> bool:
+        """Execute what is ready; returns whether to wait for more."""
+        scheduler = self._parts.scheduler
+        execute = self._look if scheduler.unlooked else self._execute_ready
+        if execute(me) or scheduler.running:
+            if not self._is_spinning() or self._parts.poller.peek() or not self._is_idle():
+                return False
+            if scheduler.running:
+                self.workers.let_standby_sleep(me)
+        return self.workers.leader is me
 
     def _goes_on(self, me: Worker) -> bool:
         """Tell whether `me` goes on leading: it waits a little for the next session."""
@@ -233,7 +264,7 @@ class CallbackRunner:
     """Executes what the scheduler started, and resumes what was suspended."""
 
     def __init__(self, parts: ExecutorParts) -> None:
-        self._executor = parts.executor
+        self._parts = parts
         self._has_own_rules = parts.executor.has_own_rules
         self._scheduler = parts.scheduler
         self._deadlines = parts.deadlines
@@ -259,7 +290,7 @@ class CallbackRunner:
                 outcome = source.run()
                 if outcome is not None and outcome is not NOTHING:
                     suspended = self._begin(outcome, source)
-                elif self._executor.is_forked:
+                elif self._parts.is_forked:
                     end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
             outcome = None
@@ -278,7 +309,7 @@ class CallbackRunner:
         """Ask the executor's own rules, then the group, which holds the entity from then on."""
         entity = source.entity
         group = entity.callback_group
-        if self._has_own_rules and not self._executor.can_execute(entity):
+        if self._has_own_rules and not self._parts.executor.can_execute(entity):
             return False
         if not source.group.is_plain:
             return bool(group.beginning_execution(entity))
@@ -319,11 +350,13 @@ class CallbackRunner:
             has_ended = True
         else:
             has_ended = False
-        if self._executor.is_forked:
+        if self._parts.is_forked:
             end_child()
         if has_ended:
             return False
-        self._suspend(ScheduledTask(ExecutorTask(coroutine, executor=self._executor), source))
+        self._suspend(
+            ScheduledTask(ExecutorTask(coroutine, executor=self._parts.executor), source)
+        )
         return True
 
     def execute_task(self, scheduled: ScheduledTask) -> object:
@@ -336,7 +369,7 @@ class CallbackRunner:
             error = None if suspended else task.exception()
             if error is not None:
                 self._report(error)
-            elif self._executor.is_forked:
+            elif self._parts.is_forked:
                 end_child()
         except BaseException as error:  # noqa: BLE001 (raised again where the executor spins)
             self._report(error)
@@ -349,9 +382,9 @@ class CallbackRunner:
         return ENDED
 
     def _report(self, error: BaseException) -> None:
-        if self._executor.is_forked:
+        if self._parts.is_forked:
             end_child(error)
-        self._executor.report(error)
+        self._parts.executor.report(error)
 
     def _suspend(self, task: ScheduledTask) -> None:
         future = awaited_future(task.task)

@@ -2,6 +2,7 @@
 
 import os
 import select
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from threading import get_ident
@@ -40,6 +41,7 @@ class EventPoller:
         self.event_fds = EventFds(self._epoll)
         self.waiting_threads: set[int] = set()
         self._next_check = 0.0
+        self._closing = threading.Lock()
         self.deadlines = deadlines(self.wake)
         # Last, for the others close themselves if there are no more descriptors.
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -47,8 +49,10 @@ class EventPoller:
         self._epoll.register(self.deadlines.timer.fd, select.EPOLLIN)
 
     def __del__(self) -> None:
-        with suppress(AttributeError):  # `__init__` may have failed half-way.
-            self.close()
+        # What still writes to it is let go of first; `__init__` may have failed half-way.
+        with suppress(AttributeError):
+            if not self.event_fds.by_number:
+                self.close()
 
     def wake(self) -> None:
         """Make the threads that wait look again."""
@@ -128,8 +132,11 @@ class EventPoller:
 
     def close(self) -> None:
         """Close the descriptors; nothing else may be called after that."""
-        if self._epoll.closed:
-            return
+        with self._closing:  # Another thread may do it, too.
+            if not self._epoll.closed:
+                self._close()
+
+    def _close(self) -> None:
         try:
             self._check()
         except LostDescriptorError:

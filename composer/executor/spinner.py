@@ -1,6 +1,5 @@
 """What spinning is: puts the parts of one executor together, and lets them run."""
 
-import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,7 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.executor.entity_registry import EntityRegistry
-from composer.executor.event_loop import CallbackRunner, EventLoop
+from composer.executor.event_loop import CallbackRunner, EventLoop, weakly
 from composer.executor.scheduler import Session
 from composer.executor.sources.event_source import ExecutorParts
 from composer.executor.wait_set_thread import WaitSetThread
@@ -83,14 +82,13 @@ class Spinner:
         self.registry = EntityRegistry(parts, self.wait_set_thread)
         runner = CallbackRunner(parts)
         self._loop = EventLoop(
-            parts, self.registry, runner, self.report, self.notifier.notify, workers
+            parts, self.registry, runner, weakly(self.report), self.notifier.notify, workers
         )
         self.workers = self._loop.workers
         self.execute_at_once = self._loop.execute_at_once
-        self._executor = parts.executor
+        self._parts = parts
         self._waiting_callbacks: set[object] = set()
         self._are_callbacks_free = False
-        self._closing = threading.Lock()
         self._errors: deque[BaseException] = deque()
 
     # Errors and wake-ups
@@ -108,7 +106,10 @@ class Spinner:
             error = self._errors.popleft()
         except IndexError:
             return
-        raise error
+        try:
+            raise error
+        finally:
+            del error  # Its traceback has this frame.
 
     def wake(self) -> None:
         """Make the leader and all threads that wait look again."""
@@ -120,7 +121,7 @@ class Spinner:
 
     def is_context_valid(self) -> bool:
         """Like `Context.ok`, which waits while the context is being shut down."""
-        handle: Any = self._executor.context.handle
+        handle: Any = self._parts.context.handle
         try:
             with handle:
                 return bool(handle.ok())
@@ -161,7 +162,7 @@ class Spinner:
     def _open(self, session: Session, *, is_watched: bool) -> Iterator[None]:
         """Let callbacks begin by `session` meanwhile, in the place of one that spins itself."""
         self._raise_error()
-        with self._executor.waiting():
+        with self._parts.executor.waiting():
             try:
                 self.wait_set_thread.add_user(session)
                 if is_watched:
@@ -216,18 +217,15 @@ class Spinner:
 
     def tear_down(self, *, wait_for_threads: bool) -> None:
         """Stop listening to all nodes, end the threads, and close what they waited for."""
-        self.registry.drop_all()
         self.wait_set_thread.close()
+        self.registry.drop_all()
         # Other callbacks that shut down, too, keep their threads a little longer.
         end_sec = GRACE_SEC if self.workers.is_in_callback() else _MAX_END_SEC
-        self.workers.end(end_sec if wait_for_threads else 0.0)
-        with self._closing:  # Another thread may shut down, too.
-            if not self.workers.has_threads():
-                self.poller.close()
+        self.workers.end(end_sec if wait_for_threads else 0.0, self.poller.close)
 
     def leave_to_parent(self) -> None:
         """Let nobody go on here: this is a forked child, and all of this belongs to its parent."""
-        self.is_shutdown = True
+        self.is_shutdown = self._parts.is_forked = True
         self.poller.leave_to_parent()
         self.workers.leave_to_parent()
 

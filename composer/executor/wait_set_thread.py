@@ -24,7 +24,7 @@ from composer.executor.sources.waitable_sources import (
     sizes_of,
 )
 
-_UNUSED_SEC = 1.0
+_UNUSED_SEC = 0.25
 _FLUSH_SEC = 1.0
 _PAUSE_SEC = 0.008
 _MAX_EVENTS_SHARE = 0.02
@@ -62,7 +62,7 @@ class WaitSetThread:
         self._sigint_guard = sigint_guard
         self._context = context
         self._owner: Owner
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # A finalizer may close it.
         self._flushed = threading.Condition(self._lock)
         self._flush_requests = 0
         self._flushes = 0

@@ -94,7 +94,7 @@ class WorkerThreads:
         on_takeover: Callable[[], None],
         report: Callable[[BaseException], None],
     ) -> None:
-        self.lock = threading.Lock()
+        self.lock = threading.RLock()  # A finalizer may end the threads.
         self.leader: Worker | None = None
         self._standby: Worker | None = None
         self._lead = lead
@@ -106,6 +106,7 @@ class WorkerThreads:
         self._workers: dict[int, Worker] = {}
         self._count = 0  # With those whose threads are still to begin.
         self._ending = False
+        self._on_end: Callable[[], None] | None = None
         self._takeover: threading.Lock | None = None
 
     @contextmanager
@@ -124,6 +125,11 @@ class WorkerThreads:
             del self._workers[ident]
             self._count -= 1
             self._remove(worker)
+            is_over = self._ending and not self._count
+            if is_over:
+                self._timer.close()
+        if is_over and self._on_end is not None:
+            self._on_end()
         if thrown is not None:
             self._report(thrown)
 
@@ -216,10 +222,15 @@ class WorkerThreads:
             self._wake_standby()
         takeover.acquire(timeout=TAKEOVER_SEC)
 
-    def end(self, timeout_sec: float) -> None:
-        """End the threads that have nothing to do, and wait for that; start none any more."""
+    def end(self, timeout_sec: float, on_end: Callable[[], None]) -> None:
+        """End the threads that have nothing to do, and wait for that; start none any more.
+
+        Args:
+            on_end: Called when all threads have ended, also later.
+        """
         with self.lock:
             self._ending = True
+            self._on_end = on_end
             for worker in self._idle:
                 worker.has_job.release()
             self._idle.clear()
@@ -229,8 +240,10 @@ class WorkerThreads:
         while self._count > mine and monotonic() < deadline:
             sleep(_POLL_SEC)
         with self.lock:
-            if not self._count:
-                self._timer.close()
+            if self._count:
+                return
+            self._timer.close()
+        on_end()
 
     def leave_to_parent(self) -> None:
         """Close the timer that this process, a forked child, shares with its parent."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import errno
 import threading
-import warnings
 from collections import deque
 from contextlib import suppress
 from time import monotonic, sleep
@@ -58,10 +57,7 @@ class SystemExecutor(ComposerExecutor):
         on_lost: Callable[[], None] | None = None,
         on_broken: Callable[[str], None] | None = None,
     ) -> None:
-        with warnings.catch_warnings():
-            # rclpy warns of a single thread, but means its own executors.
-            warnings.simplefilter('ignore', UserWarning)
-            super().__init__(threads, context=context)
+        super().__init__(threads, context=context)
         self.errors = ErrorReporter(log)
         self._on_lost = on_lost
         self._on_broken = on_broken

@@ -56,7 +56,7 @@ class SimulatedExecutor(SystemExecutor):
 
     def halt(self) -> None:
         """Wait for nothing when the interpreter ends: virtual time has ended before."""
-        self._is_shutdown = True
+        self._is_shutdown = self._is_ended = True
 
     def observe(self, node: Any, entity: Any, observer: Any) -> None:
         """Do nothing: in virtual time nothing is late or missed."""

@@ -404,5 +404,3 @@ def test_num_threads_means_what_it_does_in_rclpy(context: Context) -> None:
     executor = ComposerExecutor(num_threads=3, context=context)
     assert executor._executor._max_workers == 3
     executor.shutdown()
-    with pytest.warns(UserWarning, match='single thread'):
-        ComposerExecutor(num_threads=1, context=context).shutdown()

@@ -25,7 +25,7 @@ def test_threads_that_have_still_to_begin_count(monkeypatch):
     )
     threads.start()
     monkeypatch.undo()
-    threads.end(0.0)
+    threads.end(0.0, lambda: None)
     assert threads.has_threads()
     for work in late:
         begin(work, ())

@@ -336,7 +336,7 @@ class ServiceSource(EventSource):
         self._note_taken()
         callback = service.callback
         response = callback(request, service.srv_type.Response())
-        if self.parts.executor.is_forked:
+        if self.parts.is_forked:
             end_child()
         if self._is_async(callback):
             return self._respond(response, header)
@@ -358,7 +358,7 @@ class ServiceSource(EventSource):
 
     def _answer(self, callback: Any, message: Any) -> Any:
         response = callback(message, self.entity.srv_type.Response())
-        if self.parts.executor.is_forked:
+        if self.parts.is_forked:
             end_child()
         return response
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import weakref
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rclpy.exceptions import InvalidHandle
@@ -29,6 +30,9 @@ class ExecutorParts:
         max_running: How many callbacks may run at the same time.
         poller: Where events arrive; a new one by default.
         scheduler: Creates the queues, as `Scheduler` does.
+
+    Attributes:
+        is_forked: Whether this process is a child that was forked after the executor was made.
     """
 
     def __init__(
@@ -38,7 +42,9 @@ class ExecutorParts:
         poller: EventPoller | None = None,
         scheduler: Callable[..., Scheduler] = Scheduler,
     ) -> None:
-        self.executor = executor
+        self._executor = weakref.ref(executor)
+        self.context = executor.context
+        self.is_forked = False
         self.readiness = Readiness(executor.context)
         self.poller = poller or EventPoller()
         self.event_fds = self.poller.event_fds
@@ -47,6 +53,11 @@ class ExecutorParts:
         self.scheduler = scheduler(
             max_running, self.poller.wake, self.poller.waiting_threads, self._has_node
         )
+
+    @property
+    def executor(self) -> Any:
+        """The executor, which a thread that waits must not keep; None once it is gone."""
+        return self._executor()
 
     def _has_node(self, node: Any) -> bool:
         return node in self.executor._nodes  # noqa: SLF001

@@ -57,7 +57,7 @@ class ActionSource(EventSource):
         self._checking = threading.Lock()
         self._clock = None
         with self.hold_entity():
-            self._wait_set = _create_wait_set_of(self.entity, self.parts.executor.context)
+            self._wait_set = _create_wait_set_of(self.entity, self.parts.context)
             self._parts = c_bindings.list_parts(self._wait_set)
             self._timers = [
                 _ActionTimer(pointer, self)
@@ -213,7 +213,7 @@ class SeldomQosEventSource(WaitableSource):
         """See the base class."""
         super().open()
         with self.entity:
-            wait_set = _create_wait_set_of(self.entity, self.parts.executor.context)
+            wait_set = _create_wait_set_of(self.entity, self.parts.context)
             self.rmw_event = c_bindings.find_rmw_event(wait_set)
         self.parts.qos_event_poll.add(self)
 
