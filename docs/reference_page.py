@@ -223,7 +223,8 @@ def _describe_type(value: dict[str, Any], schema: dict[str, Any]) -> str:
 
 
 def _example(definition: dict[str, Any]) -> Iterator[str]:
-    for example in definition.get('examples', ()):
+    snippets = (each['body'] for each in definition.get('defaultSnippets', ()))
+    for example in (*definition.get('examples', ()), *snippets):
         yield ''
         yield '```yaml'
         yield from _as_yaml(example).splitlines()

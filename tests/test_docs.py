@@ -59,7 +59,7 @@ def test_every_key_has_its_row(page_name, schema):
         if isinstance(schema, dict):
             yield from schema.get('properties', {})
             for name, value in schema.items():
-                if name != 'examples':
+                if name not in ('examples', 'defaultSnippets'):
                     yield from keys(value)
         elif isinstance(schema, list):
             for value in schema:
@@ -75,7 +75,10 @@ def test_every_key_has_its_row(page_name, schema):
         *(
             (name, example)
             for name, definition in SCHEMA['$defs'].items()
-            for example in definition.get('examples', ())
+            for example in (
+                *definition.get('examples', ()),
+                *(each['body'] for each in definition.get('defaultSnippets', ())),
+            )
         ),
     ],
 )

@@ -16,7 +16,13 @@ Schema: TypeAlias = dict[str, Any]
 
 _DEFINITIONS = '#/$defs/'
 # Keywords without a meaning for the data.
-_NOTES = frozenset(('$schema', '$id', '$defs', 'title', 'description', 'examples', 'x-expected'))
+_NOTES = frozenset(
+    (
+        *('$schema', '$id', '$defs', 'title', 'description', 'x-expected'),
+        # Editors show text for an example that is a mapping only as a snippet.
+        *('examples', 'defaultSnippets'),
+    )
+)
 
 
 class SchemaCompiler:

@@ -164,11 +164,18 @@ def test_the_schema_is_one_and_accepts_its_own_examples():
 
 
 @pytest.mark.parametrize(
-    'name', [name for name, each in SCHEMA['$defs'].items() if 'examples' in each]
+    'name',
+    [
+        name
+        for name, each in SCHEMA['$defs'].items()
+        if {'examples', 'defaultSnippets'} & each.keys()
+    ],
 )
 def test_a_definition_accepts_its_examples(name):
     part = Draft202012Validator({**SCHEMA['$defs'][name], '$defs': SCHEMA['$defs']})
-    for example in SCHEMA['$defs'][name]['examples']:
+    definition = SCHEMA['$defs'][name]
+    snippets = [each['body'] for each in definition.get('defaultSnippets', ())]
+    for example in [*definition.get('examples', ()), *snippets]:
         part.validate(example)
 
 
