@@ -42,6 +42,13 @@ class StartError(ComposerError):
     """The system could not be brought up; all of it has been torn down again."""
 
 
+class EndedWhileWaitingError(SystemExit):
+    """Ends a thread that still waits when a system in virtual time has ended."""
+
+    def __str__(self) -> str:
+        return 'it still waited here when the system ended'
+
+
 class SystemStoppingError(ComposerError):
     """The system stops: what a behaviour waits for is not waited for any more."""
 

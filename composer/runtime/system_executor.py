@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
-from composer.errors import ComposerError
+from composer.errors import ComposerError, EndedWhileWaitingError
 from composer.executor import ComposerExecutor
 from composer.executor.descriptors import ExecutorError
 from composer.runtime.behaviours.error_reports import ErrorReporter
@@ -101,6 +101,9 @@ class SystemExecutor(ComposerExecutor):
             try:
                 self.spin()
             except (ShutdownException, ExternalShutdownException):
+                return
+            except EndedWhileWaitingError:
+                self._is_stopped = True
                 return
             except BaseException as error:  # noqa: BLE001 - one error must not end all nodes
                 replaced = self._restore_builtins()

@@ -188,7 +188,7 @@ class SimulatedSystem:
         functions, _findings = import_behaviours(context, context.spec)
         if self._watch is not None:
             for path in list_project_modules(folders, before).values():
-                self._watch.note_numpy_clocks(path)
+                self._watch.watch_numpy_clocks(path)
         snapshot = take_snapshot(context, prefixes)
         driver = load_system_text(_DRIVER_FILE).spec
         spec = without_processes(snapshot.spec, driver.nodes if driver else {})

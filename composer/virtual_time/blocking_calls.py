@@ -5,11 +5,15 @@ A wait tries, without blocking, what it would block for, as long as others run.
 
 from __future__ import annotations
 
+import _io
 import _queue
+import _socket
 import _thread
+import os
 import select
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,13 +25,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from composer.virtual_time.simulated_threads import SimulatedThreads
+    from composer.virtual_time.unrepeatable import Watch
 
 _NO_TIMEOUT: Final = -1
 # The arguments of `select.select` before the time-out.
 _FILES: Final = 3
+# What waits until something can be read from its first argument.
+_READS: Final[tuple[tuple[Any, tuple[str, ...]], ...]] = (
+    (_socket.socket, ('_accept', 'recv', 'recv_into', 'recvfrom', 'recvfrom_into')),
+    (_socket.socket, ('recvmsg', 'recvmsg_into')),
+    (_io.FileIO, ('read', 'readall', 'readinto')),
+    (os, ('read', 'readv')),
+)
 
 
-def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..., Any]]]:
+def blocking_calls(
+    threads: SimulatedThreads, watch: Watch
+) -> Iterator[tuple[Any, Callable[..., Any]]]:
     """Yield what blocks a thread, and what does that instead."""
     sleep = ReplacedFunction(time.sleep)
 
@@ -42,6 +56,7 @@ def blocking_calls(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..
     yield from _reentrant_locks(threads)
     yield from _queues(threads)
     yield from _selectors(threads)
+    yield from _reads(threads, watch)
     start = ReplacedFunction(_thread.start_new_thread)
 
     def start_new_thread(function: Any, arguments: Any, *keywords: Any) -> Any:
@@ -158,10 +173,11 @@ def _queues(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callabl
     yield target, get
 
 
-def _selectors(threads: SimulatedThreads) -> Iterator[tuple[ReplacedMethod, Callable[..., Any]]]:
+def _selectors(threads: SimulatedThreads) -> Iterator[tuple[Any, Callable[..., Any]]]:
     """Yield what waits for files: what another thread of the process writes comes in its turn."""
     for owner, unit in ((select.epoll, 1.0), (type(select.poll()), 1e-3)):
         yield _polling(threads, ReplacedMethod(owner, 'poll'), unit)
+    yield _selecting(threads, ReplacedFunction(select.select))
 
 
 def _polling(
@@ -183,9 +199,10 @@ def _polling(
     return target, poll
 
 
-def virtual_select(threads: SimulatedThreads) -> Callable[..., Any]:
-    """Return what does as `select.select`."""
-    real_select: Callable[..., Any] = select.select
+def _selecting(
+    threads: SimulatedThreads, target: ReplacedFunction
+) -> tuple[ReplacedFunction, Callable[..., Any]]:
+    real_select: Callable[..., Any] = target.original
 
     def select_virtually(*arguments: Any) -> Any:
         timeout = arguments[3] if len(arguments) > _FILES else None
@@ -199,4 +216,48 @@ def virtual_select(threads: SimulatedThreads) -> Callable[..., Any]:
 
         return look() or _wait_for_turns(threads, look, look, timeout) or ([], [], [])
 
-    return select_virtually
+    return target, select_virtually
+
+
+def _reads(threads: SimulatedThreads, watch: Watch) -> Iterator[tuple[Any, Callable[..., Any]]]:
+    """Yield what reads from sockets, pipes and other files, and waits for what is not there."""
+    for owner, names in _READS:
+        for name in names:
+            is_type = isinstance(owner, type)
+            target: Any = (
+                ReplacedMethod(owner, name) if is_type else ReplacedFunction(getattr(owner, name))
+            )
+            yield target, _reading(threads, watch, target.original)
+
+
+def _reading(
+    threads: SimulatedThreads, watch: Watch, real_read: Callable[..., Any]
+) -> Callable[..., Any]:
+    def read(file: Any, *arguments: Any, **keywords: Any) -> Any:
+        # What comes from other processes comes in real time.
+        if threads.mine() is not None and not watch.hears_others:
+            timeout, poller = _timeout_of(file), select.poll()
+            with suppress(OSError, TypeError, ValueError):
+                poller.register(file, select.POLLIN)
+
+            def look() -> object:
+                return poller.poll(0)
+
+            is_wait = timeout != 0 and not look()
+            if is_wait and not _wait_for_turns(threads, look, look, timeout):
+                message = 'timed out'
+                raise TimeoutError(message)
+        return real_read(file, *arguments, **keywords)
+
+    return read
+
+
+def _timeout_of(file: Any) -> float | None:
+    """Return how long a read of a file waits, in seconds; `None` for ever."""
+    if isinstance(file, _socket.socket):
+        return file.gettimeout()
+    try:
+        return None if os.get_blocking(file if isinstance(file, int) else file.fileno()) else 0.0
+    except (OSError, TypeError, ValueError):
+        # The read says what is wrong.
+        return 0.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import datetime as dt
 import time
-from threading import TIMEOUT_MAX, get_ident
+from threading import TIMEOUT_MAX
 from typing import TYPE_CHECKING, Any, Final
 
-from composer.virtual_time.originals import MOST_LOOKS
+from composer.virtual_time.originals import MOST_LOOKS, REAL
 from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
 
 if TYPE_CHECKING:
@@ -32,12 +32,13 @@ def is_duration(seconds: Any) -> bool:
 
 
 def clocks(
-    threads: SimulatedThreads, start_time_ns: int
+    threads: SimulatedThreads, start_time_ns: int, on_work: Callable[[str], None]
 ) -> Iterator[tuple[Any, Callable[..., Any]]]:
     """Yield what reads or shows the time, and what does that instead.
 
     Args:
         start_time_ns: What the wall clock says at the virtual time 0, in ns since 1970.
+        on_work: Called with the name of a function that reads a clock which counts work.
     """
     for name in ('monotonic', 'perf_counter'):
         yield _clock(threads, getattr(time, name), MONOTONIC_START_NS, 1e9)
@@ -45,7 +46,8 @@ def clocks(
     yield _clock(threads, time.time, start_time_ns, 1e9)
     yield _clock(threads, time.time_ns, start_time_ns, 1)
     for name, divisor in (('clock_gettime', 1e9), ('clock_gettime_ns', 1)):
-        yield _clock_by_identifier(threads, getattr(time, name), start_time_ns, divisor)
+        builtin = getattr(time, name)
+        yield _clock_by_identifier(threads, builtin, start_time_ns, divisor, on_work)
     for name, place in (('localtime', 0), ('gmtime', 0), ('ctime', 0)):
         yield _calendar(threads, getattr(time, name), place, time.time)
     for name, place in (('strftime', 1), ('asctime', 0)):
@@ -59,6 +61,7 @@ def _clock(
     target = ReplacedFunction(builtin)
     # Each callback reads the time several times.
     original, by_ident = target.original, threads.by_ident
+    get_ident = REAL.get_ident
 
     def read_ns() -> Any:
         thread = by_ident.get(get_ident())
@@ -82,13 +85,18 @@ def _clock(
 
 
 def _clock_by_identifier(
-    threads: SimulatedThreads, builtin: Any, start_time_ns: int, divisor: float
+    threads: SimulatedThreads,
+    builtin: Any,
+    start_time_ns: int,
+    divisor: float,
+    on_work: Callable[[str], None],
 ) -> tuple[Any, Callable[..., Any]]:
     target = ReplacedFunction(builtin)
     starts = {
         number: start
         for name, start in (
             ('CLOCK_REALTIME', start_time_ns),
+            ('CLOCK_TAI', start_time_ns),
             ('CLOCK_MONOTONIC', MONOTONIC_START_NS),
             ('CLOCK_MONOTONIC_RAW', MONOTONIC_START_NS),
             ('CLOCK_BOOTTIME', MONOTONIC_START_NS),
@@ -100,6 +108,8 @@ def _clock_by_identifier(
         start = starts.get(arguments[0]) if len(arguments) == 1 else None
         thread = threads.mine()
         if start is None or thread is None:
+            if thread is not None:
+                on_work(builtin.__name__)
             return target.original(*arguments)
         threads.count_look(thread)
         now_ns = start + threads.now_ns

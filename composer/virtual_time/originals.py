@@ -21,6 +21,7 @@ REAL: Final[Any] = SimpleNamespace(
     # Of the type, for all locks: what is looked up in a lock is replaced.
     acquire=LOCK_TYPE.__dict__['acquire'],
     start_new_thread=ReplacedFunction(_thread.start_new_thread).original,
+    get_ident=ReplacedFunction(_thread.get_ident).original,
     monotonic=ReplacedFunction(time.monotonic).original,
     monotonic_ns=ReplacedFunction(time.monotonic_ns).original,
     sleep=ReplacedFunction(time.sleep).original,

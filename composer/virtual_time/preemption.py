@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 import sysconfig
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -30,9 +31,15 @@ _ROS: Final = f'{os.sep}rclpy{os.sep}'
 _MEAN_LINES: Final = (2, 5, 20, 200)
 
 
+@cache
 def is_own_code(path: str) -> bool:
     """Tell whether a file is code of a project, and no library."""
     return not (path.startswith(_LIBRARIES) or 'site-packages' in path or _ROS in path)
+
+
+def is_of_composer(path: str) -> bool:
+    """Tell whether a file is this package's, or the command that starts it."""
+    return path.startswith((_PACKAGE, '<'))
 
 
 class Preemption:
@@ -48,7 +55,6 @@ class Preemption:
         self._pause = pause
         self._mean = shuffle.choice(_MEAN_LINES)
         self._left = self._next_gap()
-        self._is_own: dict[str, bool] = {}
 
     def begin(self) -> None:
         """Exchange the calling thread from now on."""
@@ -58,11 +64,7 @@ class Preemption:
         return 1 + int(self._shuffle.expovariate(1 / self._mean))
 
     def _on_call(self, frame: FrameType, _event: str, _argument: Any) -> Any:
-        path = frame.f_code.co_filename
-        is_own = self._is_own.get(path)
-        if is_own is None:
-            is_own = self._is_own[path] = is_own_code(path)
-        return self._on_line if is_own else None
+        return self._on_line if is_own_code(frame.f_code.co_filename) else None
 
     def _on_line(self, _frame: FrameType, event: str, _argument: Any) -> Any:
         if event == 'line':

@@ -29,7 +29,7 @@ class _MethodDef(ctypes.Structure):
 
 
 class _BuiltinFunction(ctypes.Structure):
-    """A `PyCFunctionObject` of CPython 3.10 to 3.13, without its weak references."""
+    """A `PyCFunctionObject` of CPython 3.10 to 3.13."""
 
     _fields_ = (
         ('reference_count', ctypes.c_ssize_t),
@@ -37,16 +37,14 @@ class _BuiltinFunction(ctypes.Structure):
         ('definition', ctypes.c_void_p),
         ('owner', ctypes.c_void_p),
         ('module', ctypes.c_void_p),
+        ('weak_references', ctypes.c_void_p),
+        ('vectorcall', ctypes.c_void_p),
     )
 
 
-_VARARGS, _NOARGS, _O = 0x1, 0x4, 0x8
-# Each calls its first argument, a Python function, with what a builtin of that kind is given.
-_CALLERS: Final = {
-    _NOARGS: 'PyObject_CallNoArgs',
-    _O: 'PyObject_CallOneArg',
-    _VARARGS: 'PyObject_CallObject',
-}
+_VARARGS_KEYWORDS: Final = 0x1 | 0x2
+# Calls its first argument, a Python function, with what a builtin of that kind is given.
+_CALLER: Final = ctypes.cast(_api.PyObject_Call, ctypes.c_void_p).value
 _api.PyCFunction_NewEx.restype = ctypes.py_object
 _api.PyCFunction_NewEx.argtypes = (ctypes.POINTER(_MethodDef), ctypes.py_object, ctypes.c_void_p)
 
@@ -73,7 +71,7 @@ class ReplacedFunction:
             return
         self._object = _BuiltinFunction.from_address(id(builtin))
         self._definition = self._object.definition
-        self._owner = self._object.owner
+        self._owner, self._vectorcall = self._object.owner, self._object.vectorcall
         self._replacement: Any = None
         before = _MethodDef.from_address(self._definition)
         self._copy = _MethodDef(before.name, before.function, before.flags, before.doc)
@@ -84,22 +82,22 @@ class ReplacedFunction:
         )
 
     def replace(self, function: Callable[..., Any]) -> None:
-        """Have `function` called, which takes the arguments by their positions."""
+        """Have `function` called, with the same arguments."""
         if not self._is_builtin:
             return
-        caller = _CALLERS[self._copy.flags]
-        address = ctypes.cast(getattr(_api, caller), ctypes.c_void_p).value
-        calling = _MethodDef(self._copy.name, address, self._copy.flags, self._copy.doc)
+        calling = _MethodDef(self._copy.name, _CALLER, _VARARGS_KEYWORDS, self._copy.doc)
         self._replacement = (function, calling)
         # The owner is what C functions get as their first argument.
         self._object.owner = id(function)
         self._object.definition = ctypes.addressof(calling)
+        # Without it, a call is made as the flags of the definition say.
+        self._object.vectorcall = None
 
     def restore(self) -> None:
         """Undo `replace`."""
         if self._is_builtin:
             self._object.definition = self._definition
-            self._object.owner = self._owner
+            self._object.owner, self._object.vectorcall = self._owner, self._vectorcall
 
 
 class ReplacedMethod:

@@ -6,20 +6,21 @@ tries, without blocking, what it would block for, as long as others run.
 
 from __future__ import annotations
 
+import _random
 import os
 import random
-import select
 import subprocess
 import sys
+import tempfile
 import threading
 import uuid
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
-from composer.virtual_time.blocking_calls import blocking_calls, virtual_select
+from composer.virtual_time.blocking_calls import blocking_calls
 from composer.virtual_time.clocks import clocks
 from composer.virtual_time.python_threads import process_methods, thread_methods
-from composer.virtual_time.replaced_functions import ReplacedFunction
+from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedMethod
 from composer.virtual_time.unrepeatable import THREAD, Watch, begin
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ _UUID1: Final = (
     (uuid, '_last_timestamp', None),
     (uuid, '_node', 0x0242AC110002),
 )
+_SEED_BITS: Final = 256
 # Those whose time is virtual now.
 _running: list[SimulatedThreads] = []
 
@@ -64,10 +66,10 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
         stack.callback(_running.remove, threads)
         stack.callback(begin(watch))
         for each in (
-            clocks(threads, start_time_ns),
+            clocks(threads, start_time_ns, watch.note_work),
             _entropy(threads, seed),
-            blocking_calls(threads),
-            watch.counters(),
+            blocking_calls(threads, watch),
+            watch.telling(),
         ):
             for target, function in each:
                 target.replace(function)
@@ -76,7 +78,7 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
         methods = thread_methods(threads, lambda: watch.note(THREAD))
         attributes: list[tuple[Any, str, Any]] = [(threading.Thread, *each) for each in methods]
         attributes += [(subprocess.Popen, *each) for each in process_methods(threads)]
-        attributes += [(select, 'select', virtual_select(threads)), *_UUID1]
+        attributes += [(tempfile, '_name_sequence', None), *_UUID1]
         for owner, name, value in attributes:
             stack.callback(setattr, owner, name, getattr(owner, name))
             setattr(owner, name, value)
@@ -102,12 +104,27 @@ def _seeded(seed: int) -> Iterator[None]:
 
 def _entropy(
     threads: SimulatedThreads, seed: int
-) -> Iterator[tuple[ReplacedFunction, Callable[..., Any]]]:
-    """Yield what makes random bytes: `uuid4`, `secrets` and numpy get theirs here."""
+) -> Iterator[tuple[ReplacedFunction | ReplacedMethod, Callable[..., Any]]]:
+    """Yield what makes random bytes: `uuid4`, `secrets` and numpy get theirs here.
+
+    A generator without a seed, as `random.Random()`, asks the kernel in C.
+    """
     source = random.Random(seed)  # noqa: S311 - no secret
-    target = ReplacedFunction(os.urandom)
+    seeding = ReplacedMethod(_random.Random, 'seed')
 
-    def urandom(size: Any) -> Any:
-        return target.original(size) if threads.mine() is None else source.randbytes(size)
+    def replaced(target: ReplacedFunction) -> Callable[..., Any]:
+        def read(size: Any, *flags: Any) -> Any:
+            mine = threads.mine()
+            return target.original(size, *flags) if mine is None else source.randbytes(size)
 
-    yield target, urandom
+        return read
+
+    def seed_anew(self: Any, number: Any = None) -> Any:
+        if number is None and threads.mine() is not None:
+            number = source.getrandbits(_SEED_BITS)
+        return seeding.original(self, number)
+
+    for builtin in (os.urandom, os.getrandom):
+        target = ReplacedFunction(builtin)
+        yield target, replaced(target)
+    yield seeding, seed_anew

@@ -13,10 +13,10 @@ import logging
 from collections import deque
 from contextlib import contextmanager
 from operator import itemgetter
-from threading import get_ident, get_native_id
+from threading import get_native_id
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from composer.errors import ComposerError
+from composer.errors import ComposerError, EndedWhileWaitingError
 from composer.virtual_time.originals import MOST_LOOKS, REAL
 from composer.virtual_time.preemption import Preemption
 from composer.virtual_time.simulated_thread import Call, SimulatedThread, Wait
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from random import Random
 
+_get_ident = REAL.get_ident
 _LOOK_SEC = 0.25
 _ON_TIME: Final = 0
 _LATE: Final = 1
@@ -37,13 +38,6 @@ _STEP_NS: Final = 1_000_000
 
 # When, whether after all else at that time, a number that keeps the order, and what.
 _Due: TypeAlias = 'tuple[int, int, int, Wait | Call]'
-
-
-class EndedWhileWaitingError(SystemExit):
-    """Ends a thread that still waits when the system has ended."""
-
-    def __str__(self) -> str:
-        return 'it still waited here when the system ended'
 
 
 class NothingHappensError(ComposerError):
@@ -71,6 +65,7 @@ class SimulatedThreads:
         current: The thread whose turn it is.
         on_advance: Called with the time when it has become that.
         turns: How many turns there have been.
+        begin_tracing: Called in each thread that begins, to look at its lines; `None` for nothing.
         by_ident: The threads that wait in virtual time now, by what `threading.get_ident` says.
     """
 
@@ -89,16 +84,18 @@ class SimulatedThreads:
         self._is_closing = False
         self._is_picking = False
         self._watch = StuckWatch(limit_sec)
-        self._preemption = Preemption(shuffle, self.pause) if shuffle is not None else None
+        self.begin_tracing: Callable[[], None] | None = (
+            Preemption(shuffle, self.pause).begin if shuffle is not None else None
+        )
 
     def mine(self) -> SimulatedThread | None:
         """Return the thread that calls, if it takes turns and waits in virtual time now."""
-        return self.by_ident.get(get_ident())
+        return self.by_ident.get(_get_ident())
 
     @contextmanager
     def entered(self) -> Iterator[None]:
         """Let the calling thread take turns meanwhile; the first turn is its."""
-        ident = get_ident()
+        ident = _get_ident()
         if ident in self.by_ident:
             yield
             return
@@ -114,7 +111,7 @@ class SimulatedThreads:
     @contextmanager
     def outside(self) -> Iterator[None]:
         """Let the waits of the calling thread be real ones, and nobody else run meanwhile."""
-        ident = get_ident()
+        ident = _get_ident()
         thread = self.by_ident.pop(ident, None)
         try:
             yield
@@ -131,11 +128,11 @@ class SimulatedThreads:
     def run(self, thread: SimulatedThread, function: Callable[..., Any], *args: Any) -> None:
         """Call a function when it is the turn of `thread`, which is the calling thread then."""
         REAL.acquire(thread.turn)
-        thread.ident, thread.native = get_ident(), get_native_id()
+        thread.ident, thread.native = _get_ident(), get_native_id()
         self.by_ident[thread.ident] = thread
         try:
-            if self._preemption is not None:
-                self._preemption.begin()
+            if self.begin_tracing is not None:
+                self.begin_tracing()
             if thread.error is None:
                 function(*args)
         except SystemExit:
@@ -186,7 +183,7 @@ class SimulatedThreads:
         if me is None:
             message = 'a thread that takes no turns waits for those that do'
             raise RuntimeError(message)
-        if me.ident != get_ident():
+        if me.ident != _get_ident():
             # It was given up: others go on without it.
             raise SystemExit
         if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
@@ -232,7 +229,7 @@ class SimulatedThreads:
     def pause(self) -> None:
         """Let others run first, if any can."""
         me = self.current
-        if me is None or me.ident != get_ident():
+        if me is None or me.ident != _get_ident():
             return
         if me.on_wait is not None:
             me.on_wait()

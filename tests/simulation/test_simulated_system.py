@@ -232,6 +232,18 @@ def test_a_loop_without_end_is_found_and_ended(simulate):
             'from socket import socket\ndef f(node, s=socket()): s.bind(("", 0)) or s.close()',
             'uses a socket',
         ),
+        ('import os\ndef f(node): os.getpid(), os.getpid()', 'the number of a process'),
+        ('import threading\ndef f(node): threading.current_thread().ident', 'or thread'),
+        ('from threading import get_ident\ndef f(node, i=get_ident): i()', 'reads get_ident'),
+        ('from os.path import *\ndef f(node): getmtime(__file__)', 'reads st_mtime of a file'),
+        ('from pathlib import Path\ndef f(node): Path().stat().st_ino', 'reads st_ino of a file'),
+        ('import tempfile\ndef f(node): tempfile.NamedTemporaryFile()', 'makes a temporary file'),
+        ('import time\ndef f(node): time.clock_gettime(2)', 'counts real work'),
+        ('import resource\ndef f(node): resource.getrusage(0)', 'counts real work'),
+        ('import signal\ndef f(node): signal.sigtimedwait([10], 0)', 'signals come in real time'),
+        ('\ndef f(node): open("/proc/self/stat").close()', 'a file of the kernel'),
+        ('import socket\ndef f(node): socket.gethostname()', 'the name of this machine'),
+        ('\ndef f(node): id(node)', 'an address'),
     ],
 )
 def test_what_may_be_otherwise_is_noted(simulate, code, what):
@@ -242,3 +254,28 @@ def test_what_may_be_otherwise_is_noted(simulate, code, what):
     assert what in str(notice)
     assert notice.file.endswith('parts.py')
     assert notice.line == 2
+
+
+def test_what_is_not_done_or_tells_nothing_is_not_noted(simulate):
+    nodes = 'nodes: {n: {timers: {t: {period: 1.0, behaviour: "parts:f"}}}}'
+    code = """
+        import copy, json, logging, os, pathlib, socket, tempfile, threading
+        import numpy as np
+
+        def never():
+            np.datetime64('now')
+
+        def f(node):
+            logging.getLogger('parts').warning('a line has the number of its process')
+            copy.deepcopy([node.name])
+            here, there = socket.socketpair()
+            here.close(), there.close()
+            tempfile.TemporaryFile().close()
+            pathlib.Path(__file__).exists(), os.path.getsize(__file__)
+            threading.local().x = threading.current_thread().name
+            import colorsys
+        """
+    with simulate(nodes, code) as system:
+        system.forward(1.0)
+        assert system.events[-1].kind != 'error'
+    assert system.notices == []

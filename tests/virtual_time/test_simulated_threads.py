@@ -163,11 +163,11 @@ def _loop_without_end():
 
 def _block_in_c():
     source, sink = os.pipe()
-    threading.Timer(3, os.close, [sink]).start()
+    threading.Timer(3, os.close, [source]).start()
     try:
-        os.read(source, 1)
-    finally:
-        os.close(source)
+        os.write(sink, bytes(1_000_000))
+    except BrokenPipeError:
+        os.close(sink)
 
 
 def _start_and_wait(thread):
@@ -358,12 +358,22 @@ def test_a_forked_process_has_real_time():
 
 
 def test_chance_is_the_seed():
+    numpy = pytest.importorskip('numpy')
+
     def run(seed):
         with virtual_time(seed):
             import secrets
+            import tempfile
             import uuid
 
-            return random.random(), os.urandom(4), uuid.uuid4(), secrets.token_hex(), uuid.uuid1()
+            unseeded = random.Random(), numpy.random.default_rng(), numpy.random.RandomState()
+            random.seed()
+            numpy.random.seed()
+            return (
+                *(str(each.random()) for each in (random, numpy.random, *unseeded)),
+                *(os.urandom(4), os.getrandom(4), uuid.uuid4(), secrets.token_hex(), uuid.uuid1()),
+                *(random.SystemRandom().random(), tempfile.mktemp()),
+            )
 
     assert run(1) == run(1)
     for one, other in zip(run(1), run(2), strict=True):

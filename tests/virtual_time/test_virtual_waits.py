@@ -5,6 +5,8 @@ import asyncio
 import os
 import queue
 import select
+import selectors
+import socket
 import subprocess
 import sys
 import threading
@@ -294,6 +296,61 @@ def _epoll():
     _pipes(wait)
 
 
+def _read_of_a_pipe():
+    _pipes(lambda source: None)
+
+
+def _read_of_a_buffered_pipe():
+    source, sink = os.pipe()
+    _after(3, os.close, sink)
+    with os.fdopen(source, 'rb') as file:
+        assert file.read() == b''
+
+
+def _sockets(receive):
+    here, there = socket.socketpair()
+    with here, there:
+        _after(3, there.send, b'a\n')
+        receive(here)
+
+
+def _socket():
+    def receive(here):
+        here.settimeout(1)
+        with pytest.raises(TimeoutError, match='timed out'):
+            here.recv(1)
+        here.settimeout(5)
+        assert here.recvmsg(9)[0] == b'a\n'
+
+    _sockets(receive)
+
+
+def _file_of_a_socket():
+    _sockets(lambda here: here.makefile().readline())
+
+
+def _server():
+    def connect():
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(f'\0{__name__}{os.getpid()}')
+
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(f'\0{__name__}{os.getpid()}')
+        server.listen()
+        client = _after(3, connect)
+        server.accept()[0].close()
+        client.join()
+
+
+def _selector():
+    def wait(source):
+        with selectors.SelectSelector() as selector:
+            selector.register(source, selectors.EVENT_READ)
+            assert selector.select(1) == []
+
+    _pipes(wait)
+
+
 def _thread_join():
     thread = threading.Thread(target=sleep, args=(3,))
     thread.start()
@@ -319,7 +376,7 @@ _WAITS = [
     each
     for name, each in list(globals().items())
     if name.startswith('_')
-    and name not in {'_after', '_pipes'}
+    and name not in {'_after', '_pipes', '_sockets'}
     and callable(each)
     and getattr(each, '__module__', '') == __name__
 ]

@@ -18,6 +18,8 @@ _SUSPENDABLE = (CoroutineType, GeneratorType, AsyncGeneratorType)
 _FRAMES = ('cr_frame', 'gi_frame', 'ag_frame')
 _AWAITED = ('cr_await', 'gi_yieldfrom', 'ag_await')
 _OWN_FOLDER = str(Path(__file__).resolve().parents[2])
+# Its frames are in the place of those of what a behaviour waits with.
+_VIRTUAL_TIME = str(Path(_OWN_FOLDER, 'virtual_time'))
 # What calls behaviours; the frames around it are of no interest.
 _WRAPPER = str(Path(__file__).resolve().with_name('calls.py'))
 _MOST_FRAMES = 200
@@ -94,6 +96,8 @@ def _format(frames: list[FrameType]) -> str:
     files = [frame.f_code.co_filename for frame in frames]
     outer = files.index(_WRAPPER) + 1 if _WRAPPER in files else 0
     inner = list(dropwhile(lambda frame: is_own(frame.f_code.co_filename), frames[outer:]))
+    while inner and inner[-1].f_code.co_filename.startswith(_VIRTUAL_TIME):
+        inner.pop()
     walked = ((frame, frame.f_lineno) for frame in inner or frames)
     text = ''.join(traceback.StackSummary.extract(walked).format()).rstrip()
     return text or '  (it has ended)'

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import traceback
 
-from composer.errors import ActionNotAvailableError, ComposerError, ServiceNotAvailableError
+from composer.errors import (
+    ActionNotAvailableError,
+    ComposerError,
+    EndedWhileWaitingError,
+    ServiceNotAvailableError,
+)
 from composer.runtime.behaviours.stacks import is_own
 
 _LONGEST_SUMMARY = 500
@@ -80,7 +85,7 @@ def _drop_own_frames(described: traceback.TracebackException, error: BaseExcepti
     """
     frames = list(described.stack)
     others = [index for index, frame in enumerate(frames) if not is_own(frame.filename)]
-    if isinstance(error, ComposerError):
+    if isinstance(error, ComposerError | EndedWhileWaitingError):
         frames = frames[others[0] : others[-1] + 1] if others else []
     elif others:
         frames = frames[others[0] :]

@@ -17,18 +17,27 @@ from typing import IO, TYPE_CHECKING, NoReturn, TextIO
 
 from composer.executor.after_fork import flush_output
 from composer.scenarios.running.case_results import CaseFailure, CaseResult
+from composer.virtual_time.preemption import is_of_composer, is_own_code
+from composer.virtual_time.replaced_functions import ReplacedFunction
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import ModuleType
 
 _PR_SET_PDEATHSIG = 1
 # A process that does not end by itself at its limit is killed so much later.
 _GRACE_SEC = 5.0
 # Of longer output, the end is kept.
 _LONGEST_OUTPUT = 200_000
-# The innermost call of a thread that waits for its turn, as faulthandler shows it.
+# A call, and the innermost one of a thread that waits for its turn, as faulthandler shows them.
+_CALL = re.compile(r'^  File "([^"]*)", line .*\n?', re.MULTILINE)
 _WAITING = re.compile(
-    r'recent call first\):\n  File "[^"]*simulated_threads\.py", line \d+ in _park'
+    r'recent call first\):\n  File "[^"]*simulated_threads\.py", line \d+ in (_park|run)'
+)
+# What may end the process, and says nothing of it.
+_ENDS: tuple[tuple[ModuleType, str], ...] = (
+    *((os, name) for name in ('_exit', 'kill', 'killpg', 'execv', 'execve')),
+    (signal, 'raise_signal'),
 )
 _TIMEOUT = re.compile(r'^Timeout \(.*\)!\n', re.MULTILINE)
 
@@ -95,17 +104,18 @@ class CaseProcess:
             result = pickle.load(self._result)  # noqa: S301 - our own
             if isinstance(result, CaseResult):
                 return result
-        stack = _without_waits(_read_end(self._stack))
-        if _TIMEOUT.search(stack) or monotonic() > self.kill_at:
+        written = _read_end(self._stack)
+        stack = _shorten(_TIMEOUT.sub('', written))
+        if _TIMEOUT.search(written) or monotonic() > self.kill_at:
             message = f'it took longer than {self._limit_sec:g} s of real time'
-            stack = _TIMEOUT.sub('', stack)
             return CaseResult((CaseFailure('stuck', message, stack=stack),))
         return CaseResult((CaseFailure('died', f'its process {_explain_end(code)}', stack=stack),))
 
     def _run(self, run: Callable[[], CaseResult], *, captures: bool) -> NoReturn:
         code = 1
+        leave: Callable[[int], NoReturn] = os._exit
         try:
-            self._settle(captures=captures)
+            leave = self._settle(captures=captures)
             pickled = pickle.dumps(run())
             flush_output()
             self._result.write(pickled)
@@ -115,10 +125,10 @@ class CaseProcess:
             sys.excepthook(*sys.exc_info())
         finally:
             flush_output()
-            os._exit(code)
+            leave(code)
 
-    def _settle(self, *, captures: bool) -> None:
-        """Make the forked process one of its own."""
+    def _settle(self, *, captures: bool) -> Callable[[int], NoReturn]:
+        """Make the forked process one of its own; return what ends it."""
         os.setpgid(0, 0)
         # If the server is killed, so is this one.
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -127,6 +137,29 @@ class CaseProcess:
         _forget_the_fork()
         faulthandler.enable(self._stack)
         faulthandler.dump_traceback_later(self._limit_sec, exit=True, file=self._stack)
+        leave: Callable[[int], NoReturn] = ReplacedFunction(os._exit).original
+        self._ends: list[ReplacedFunction] = []
+        for module, name in _ENDS:
+            ends = ReplacedFunction(getattr(module, name))
+            ends.replace(self._told(ends.original, os.getpid()))
+            self._ends.append(ends)
+        return leave
+
+    def _told(self, end: Callable[..., object], pid: int) -> Callable[..., object]:
+        """Return what ends the process as `end` does, and leaves its stack."""
+
+        def end_with_stack(*arguments: object, **keywords: object) -> object:
+            if os.getpid() == pid:
+                faulthandler.dump_traceback(self._stack, all_threads=False)
+            try:
+                return end(*arguments, **keywords)
+            finally:
+                # It goes on.
+                if os.getpid() == pid:
+                    self._stack.seek(0)
+                    self._stack.truncate()
+
+        return end_with_stack
 
 
 def _take_over_output(output: IO[bytes], errors: IO[bytes], *, captures: bool) -> None:
@@ -159,11 +192,20 @@ def _read_end(file: IO[bytes]) -> str:
     return text if size <= _LONGEST_OUTPUT else f'…{text}'
 
 
-def _without_waits(stacks: str) -> str:
-    """Return the stacks without those of threads that wait for their turns."""
-    parts = stacks.split('\n\n')
-    busy = [part for part in parts if not _WAITING.search(part)]
-    return '\n\n'.join(busy if any('File "' in part for part in busy) else parts)
+def _shorten(stacks: str) -> str:
+    """Return the calls of behaviours, and of libraries in threads that do not wait.
+
+    If there are none, all calls are returned.
+    """
+    shown, has_calls = [], False
+    for part in stacks.split('\n\n'):
+        files = _CALL.findall(part)
+        is_shown = any(map(is_own_code, files)) or not _WAITING.search(part)
+        short = _CALL.sub(lambda call: '' if is_of_composer(call[1]) else call[0], part)
+        if is_shown and (not files or _CALL.search(short)):
+            shown.append(short)
+            has_calls |= bool(files)
+    return '\n\n'.join(shown) if has_calls else stacks
 
 
 def _explain_end(code: int) -> str:

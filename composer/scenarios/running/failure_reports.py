@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from composer.scenarios.running.case_results import CaseFailure
 from composer.scenarios.times import format_seconds
 from composer.simulation.trace import render_event
+from composer.virtual_time.preemption import is_of_composer, is_own_code
 from composer.virtual_time.stuck_threads import SimulationStuckError
 
 if TYPE_CHECKING:
@@ -51,10 +52,20 @@ def describe_error(error: ComposerError, events: Sequence[Event]) -> CaseFailure
     """Return an error that ended a case as the report has it."""
     around = tuple(show_around(events, events[-1].time_ns if events else None, ()))
     if isinstance(error, SimulationStuckError):
-        frame = sys._current_frames().get(error.thread)  # noqa: SLF001 - the only way
-        stack = ''.join(traceback.format_stack(frame)) if frame else ''
+        stack = '\n'.join(_list_stacks(error.thread))
         return CaseFailure('stuck', str(error), around=around, stack=stack)
     return CaseFailure('start', str(error), around=around)
+
+
+def _list_stacks(stuck: int) -> Iterator[str]:
+    """Yield the stack of the thread that is stuck, and of others that a behaviour waits in."""
+    frames = sys._current_frames()  # noqa: SLF001 - the only way
+    for ident in sorted(frames, key=lambda each: each != stuck):
+        calls = traceback.extract_stack(frames[ident])
+        shown = [each for each in calls if not is_of_composer(each.filename)]
+        if ident == stuck or any(is_own_code(each.filename) for each in shown):
+            title = 'It is at' if ident == stuck else 'Another thread waits at'
+            yield f'{title}\n{"".join(traceback.format_list(shown or calls))}'
 
 
 def show_around(

@@ -5,12 +5,15 @@ import select
 import signal
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from composer.scenarios.running.case_process import CaseProcess
 from composer.scenarios.running.case_results import CaseResult
 from tests.running import is_there
+from tests.virtual_time.virtual_runs import virtual_time
 
 DEADLINE_SEC = 30
 
@@ -73,8 +76,48 @@ def test_a_process_that_dies_is_a_failure(function, message):
     assert (failure.kind, failure.message) == ('died', message)
 
 
-def test_a_crash_in_c_has_its_stack():
-    assert 'in segfault' in failure_of(segfault).stack
+def leave():
+    os._exit(3)
+
+
+def kill_itself():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def raise_a_signal():
+    signal.raise_signal(signal.SIGTERM)
+
+
+def become_another():
+    os.execv('/bin/true', ['true'])
+
+
+@pytest.mark.parametrize(
+    'function', [segfault, leave, kill_itself, raise_a_signal, become_another]
+)
+def test_what_ends_its_process_is_shown(function):
+    stack = failure_of(function).stack
+    assert f'in {function.__name__}' in stack
+    assert '/case_process.py' not in stack
+
+
+def wait_for_a_pool():
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(hold_interpreter).result()
+
+
+def wait_in_turns(function):
+    with virtual_time(limit_sec=DEADLINE_SEC):
+        thread = threading.Thread(target=function)
+        thread.start()
+        thread.join()
+
+
+def test_a_pool_that_does_not_end_is_shown_with_who_waits_for_it():
+    stack = failure_of(lambda: wait_in_turns(wait_for_a_pool), limit_sec=1.0).stack
+    assert 'in hold_interpreter' in stack
+    assert 'in wait_for_a_pool' in stack
+    assert 'in _park' not in stack
 
 
 @pytest.mark.parametrize('function', [loop, hold_interpreter])
