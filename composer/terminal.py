@@ -6,6 +6,7 @@ Shown as it is, it could clear the screen, or look like a line that Composer wro
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _INDENT = '  '
+_LINE_END = re.compile(r'\r?\n|\r')
+_COLOUR = re.compile(r'(\x1b\[[0-9;:]{0,40}m)')
+_RESET = '\x1b[0m'
+_RESETS = (_RESET, '\x1b[m')
 
 
 def escape(text: str) -> str:
@@ -37,6 +42,26 @@ def escape_lines(text: str) -> str:
     first, *others = text.split('\n')
     lines = (f'{_INDENT}{escape(line)}' if line else '' for line in others)
     return '\n'.join([escape(first), *lines])
+
+
+def escape_output(text: str) -> str:
+    r"""Return what another program has written, of one or more lines, as `escape` does.
+
+    Tabs and colours (SGR) stay, up to the end of their line. A carriage return ends a line: what
+    comes after it would hide the beginning. Nothing but colours is obeyed by a terminal: not its
+    title, nor its clipboard (OSC 52).
+    """
+    return '\n'.join(map(_escape_coloured, _LINE_END.split(text)))
+
+
+def _escape_coloured(line: str) -> str:
+    if line.isprintable():
+        return line
+    # Text, and colours between it.
+    parts = _COLOUR.split(line)
+    parts[::2] = ('\t'.join(map(escape, part.split('\t'))) for part in parts[::2])
+    is_coloured = len(parts) > 1 and parts[-2] not in _RESETS
+    return ''.join([*parts, _RESET if is_coloured else ''])
 
 
 class EscapingLogger:

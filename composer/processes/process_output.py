@@ -9,6 +9,8 @@ import sys
 import threading
 from contextlib import suppress
 
+from composer.terminal import escape, escape_output
+
 _CHUNK = 1 << 16
 # Together as much as the largest pipe holds.
 _LAST_CHUNKS = 16
@@ -24,19 +26,23 @@ class _Output:
 
     def __init__(self, name: str) -> None:
         self.ended = threading.Event()
-        self._prefix = f'[{name}] '
+        self._prefix = f'[{escape(name)}] '
         self._decoder = codecs.getincrementaldecoder('utf-8')('backslashreplace')
         self._rest = ''
 
     def take(self, data: bytes) -> str:
         """Return the lines that are complete; empty data marks the end of the output."""
         text = self._rest + self._decoder.decode(data, final=not data)
-        lines, separator, self._rest = text.replace('\r\n', '\n').rpartition('\n')
+        # A line feed may follow the last one.
+        text, returned = (text[:-1], '\r') if data and text.endswith('\r') else (text, '')
+        text = text.replace('\r\n', '\n').replace('\r', '\n')
+        lines, separator, rest = text.rpartition('\n')
+        self._rest = rest + returned
         if self._rest and (not data or len(self._rest) > _LONGEST_LINE):
             lines, separator, self._rest = f'{lines}{separator}{self._rest}', '\n', ''
         if not separator:
             return ''
-        return self._prefix + lines.replace('\n', f'\n{self._prefix}') + '\n'
+        return self._prefix + escape_output(lines).replace('\n', f'\n{self._prefix}') + '\n'
 
 
 class ProcessOutputs:

@@ -24,6 +24,7 @@ from composer.errors import ExitCode
 from composer.launch_files.texts import Computed
 from composer.launch_files.verification.comparison import pair
 from composer.launch_files.verification.given import read_given
+from composer.terminal import escape_output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -177,7 +178,7 @@ def _run(
         if len(found) < site.expected:
             log.seek(0)
             click.echo(f'{kind}: {len(found)} of {site.expected} processes began', err=True)
-            click.echo(log.read()[-2000:], err=True)
+            click.echo(escape_output(log.read()[-2000:]), err=True)
     texts = (each.read_text(encoding='utf-8') for each in found)
     return [read_given(json.loads(text), site.replaced) for text in texts]
 

@@ -17,6 +17,7 @@ from composer.errors import ComposerError, ExitCode
 from composer.processes.own_process import own_command
 from composer.runtime.control.readiness import VARIABLE
 from composer.runtime.environment import check_ros, find_log_folder
+from composer.terminal import escape_output
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +56,7 @@ def start_detached(path: Path, arguments: Sequence[str], host: str = '') -> int:
                 process.wait()
                 raise
     text = log.read_text(encoding='utf-8', errors='backslashreplace')
-    click.echo(text, nl=False, err=True)
+    click.echo(escape_output(text), nl=False, err=True)
     if is_up:
         click.echo(f'process {process.pid}, log {log}', err=True)
         return ExitCode.DONE

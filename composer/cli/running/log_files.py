@@ -16,6 +16,7 @@ from composer.errors import ComposerError, ExitCode, UsageError
 from composer.runtime.control.name_claim import list_claims
 from composer.runtime.environment import check_shell, find_log_folder
 from composer.spelling import suggest
+from composer.terminal import escape_output
 
 if TYPE_CHECKING:
     from typing import BinaryIO
@@ -88,8 +89,9 @@ def _describe(claim: dict[str, Any]) -> str:
 
 def _copy(stream: BinaryIO) -> None:
     """Print what a file has that was not printed yet."""
-    while chunk := stream.read(_CHUNK):
-        click.echo(chunk, nl=False)
+    # The rest of a line comes with it: what a terminal obeys may lie on both sides.
+    while chunk := stream.read(_CHUNK) + stream.readline(_CHUNK):
+        click.echo(escape_output(chunk.decode(errors='backslashreplace')), nl=False)
 
 
 def _follow(stream: BinaryIO, pid: int) -> None:
