@@ -6,7 +6,11 @@ Shown as it is, it could clear the screen, or look like a line that Composer wro
 
 from __future__ import annotations
 
+import os
 import re
+import select
+import stat
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -85,6 +89,17 @@ class EscapingLogger:
     def error(self, text: str) -> None:
         """Log what is wrong."""
         self._logger.error(escape_lines(text))
+
+
+def is_output_unread() -> bool:
+    """Return whether standard output or error is a pipe whose reader has gone, as `head` does."""
+    poll = select.poll()
+    for descriptor in (1, 2):
+        with suppress(OSError):
+            # Of other kinds, as sockets of a journal, readers may come back.
+            if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
+                poll.register(descriptor, 0)
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def colour_of(environment: Mapping[str, str]) -> bool | None:

@@ -6,9 +6,10 @@ import faulthandler
 import gc
 import io
 import os
+import stat
 import sys
 from contextlib import suppress
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 import click
 
@@ -17,16 +18,21 @@ from composer.cli.commands import cli
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.terminal import escape_lines
 
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
 _LONGEST_EXIT_SEC = 10.0
 
 
 def main() -> None:
     """Run the command line of this process, and exit with its code."""
     _open_closed_streams()
-    for stream in (sys.stdout, sys.stderr):
+    for name in ('stdout', 'stderr'):
+        stream = getattr(sys, name)
         # File names and YAML may have characters that the terminal's encoding lacks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
+            setattr(sys, name, _without_reader(stream))
     code = _flush(run(sys.argv[1:]))
     if 'rclpy' not in sys.modules:
         # Python would look for garbage in all that is left, a tenth of a check's time. Only what
@@ -37,6 +43,29 @@ def main() -> None:
     with suppress(RuntimeError, ValueError):
         faulthandler.dump_traceback_later(_LONGEST_EXIT_SEC, exit=True)
     sys.exit(code)
+
+
+class _PipeOutput(io.FileIO):
+    """A pipe whose reader may go, as `head` does: the command ends as it would with one."""
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            return memoryview(data).nbytes
+
+
+def _without_reader(stream: io.TextIOWrapper) -> io.TextIOWrapper:
+    """Return a stream that nobody needs to read; the same one if it is no pipe."""
+    if not stat.S_ISFIFO(os.fstat(stream.fileno()).st_mode):
+        return stream
+    return io.TextIOWrapper(
+        io.BufferedWriter(_PipeOutput(stream.fileno(), 'w', closefd=False)),
+        encoding=stream.encoding,
+        errors=stream.errors,
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
 
 
 def run(arguments: list[str]) -> int:

@@ -47,7 +47,7 @@ def describe_change(change: Change) -> str:
     if change.is_code:
         what = 'other definitions' if change.top_key == 'interfaces' else 'new code'
         return f'{change.key} has {what}{places}'
-    values = [_show(each) for each in (change.old, change.new)]
+    values = _show_both(change.old, change.new)
     if change.old is None:
         return f'{change.key} = {values[1]}{places}'
     if change.new is None:
@@ -89,13 +89,28 @@ def _describe_places(change: Change) -> str:
     return f' ({places})' if places else ''
 
 
-def _show(value: Any) -> str:
+def _show_both(old: Any, new: Any) -> list[str]:
+    """Return two values as text, long ones cut around where they differ."""
+    texts = [_write(each) for each in (old, new)]
+    start = 0
+    if None not in (old, new):
+        pairs = zip(*texts, strict=False)
+        same = next((i for i, (a, b) in enumerate(pairs) if a != b), min(map(len, texts)))
+        start = max(0, same - _LONGEST_VALUE // 3) if same > _LONGEST_VALUE // 2 else 0
+    return [_cut(text, start) for text in texts]
+
+
+def _cut(text: str, start: int) -> str:
+    if len(text) <= _LONGEST_VALUE:
+        return text
+    shown = text[start : start + _LONGEST_VALUE]
+    return f'{"…" * (start > 0)}{shown}{"…" * (start + _LONGEST_VALUE < len(text))}'
+
+
+def _write(value: Any) -> str:
+    """Return a value as text; what is hidden is so before a part of it is cut away."""
     text = json.dumps(value, ensure_ascii=False, default=str)
-    if isinstance(value, str) and _is_plain(value):
-        text = value
-    if len(text) > _LONGEST_VALUE:
-        text = f'{text[:_LONGEST_VALUE]}…'
-    return conceal(text)
+    return conceal(value if isinstance(value, str) and _is_plain(value) else text)
 
 
 def _is_plain(text: str) -> bool:

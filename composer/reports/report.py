@@ -35,6 +35,7 @@ class CheckedFile:
         combination: The name of the combination that it was checked with, if any.
         cases: How many cases a scenario file has; `None` for a system.
         crossings: What crosses between its workers and hosts, a line each.
+        processes: How many external processes it declares.
     """
 
     name: str
@@ -44,6 +45,7 @@ class CheckedFile:
     combination: str | None = None
     cases: int | None = None
     crossings: tuple[str, ...] = ()
+    processes: int = 0
 
     @property
     def variant(self) -> str:

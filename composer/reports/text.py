@@ -58,6 +58,9 @@ def _list_crossings(file: CheckedFile) -> str:
 def _count_content(file: CheckedFile) -> str:
     if file.cases is not None:
         return count(file.cases, 'case')
+    if file.nodes == 0 and file.processes:
+        number = file.processes
+        return '1 external process' if number == 1 else f'{number} external processes'
     return '' if file.nodes is None else count(file.nodes, 'node')
 
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import select
-import stat
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -109,17 +106,6 @@ def has_rosout_publisher(logger_name: str) -> bool:
     if found:
         _rclpy.rclpy_logging_rosout_remove_sublogger(logger_name, _PROBE)
     return found
-
-
-def is_output_unread() -> bool:
-    """Return whether standard output or error is a pipe whose reader has gone, as `head` does."""
-    poll = select.poll()
-    for descriptor in (1, 2):
-        with suppress(OSError):
-            # Of other kinds, as sockets of a journal, readers may come back.
-            if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
-                poll.register(descriptor, 0)
-    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def _as_logger_name(name: str) -> str:

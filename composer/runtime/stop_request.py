@@ -7,7 +7,8 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
-from composer.runtime.logs import is_output_unread, system_logger
+from composer.runtime.logs import system_logger
+from composer.terminal import is_output_unread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

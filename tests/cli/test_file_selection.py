@@ -175,3 +175,19 @@ def test_a_pattern_matches_nothing_that_is_hidden(tree, tmp_path):
     (tmp_path / '.tool' / 'two.yaml').write_text(SYSTEM)
     assert select('**/*.yaml') == (['one.yaml'], [])
     assert select('.tool/*.yaml') == (['.tool/two.yaml'], [])
+
+
+def test_a_file_that_another_names_as_its_layer_is_no_system_of_a_folder(tmp_path):
+    layer = 'nodes:\n  n:\n    timers: {t: {period: 1, behaviour: "b:f"}}\n'
+    for name in ('checked.yaml', 'tested.yaml', 'broken.yaml'):
+        (tmp_path / name).write_text(layer)
+    (tmp_path / 'a.yaml').write_text(
+        'version: 1\nnodes: {}\ncheck: {with_node: {layers: [checked.yaml]}}\n'
+    )
+    (tmp_path / 'a.scenario.yaml').write_text(
+        'version: 1\nsystem: {file: a.yaml, layers: [tested.yaml]}\ncases: {}\n'
+    )
+
+    found = select_files([str(tmp_path)])
+
+    assert [each.path.name for each in found.systems] == ['a.yaml', 'broken.yaml']

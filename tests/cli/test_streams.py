@@ -62,3 +62,22 @@ def test_a_full_standard_output_is_an_ordinary_error(run_all):
     written = [command not in (f'up {BAD}', 'unknown') for command in COMMANDS]
     assert codes == [2 if command == 'unknown' else 1 for command in COMMANDS]
     assert [FULL in error for error in errors] == written
+
+
+@pytest.mark.parametrize(
+    ('words', 'code'), [(['explain'], 0), (['check', 'good.yaml'], 0), (['check', 'bad.yaml'], 1)]
+)
+def test_a_reader_that_has_gone_changes_no_exit_code(tmp_path, words, code):
+    (tmp_path / 'good.yaml').write_text('version: 1\nnodes: {n: {}}\n')
+    (tmp_path / 'bad.yaml').write_text('version: 1\nnodes: {n: {x: 1}}\n')
+    reader, writer = os.pipe()
+    os.close(reader)
+
+    command = [sys.executable, '-m', 'composer', *words]
+    ended = subprocess.run(
+        command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(writer)
+
+    assert ended.returncode == code, ended.stderr
+    assert 'Broken pipe' not in ended.stderr

@@ -7,6 +7,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from composer.cli.main import run as run_command
+from composer.diagnostics import SourceFile, Span
+from composer.planning.plan import Change
+from composer.planning.text import describe_change
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -296,3 +299,16 @@ def test_the_document_is_as_its_schema_says(plan, old, new, name, lines):
     Draft202012Validator(schema).validate(document)
     assert len(document['operations']) == len(lines) == sum(document['counts'].values())
     assert code == 0
+
+
+def test_long_values_are_cut_around_their_difference():
+    words = [f'word_{number}' for number in range(40)]
+    changed = [*words[:30], 'other', *words[31:]]
+    at = Span(SourceFile('a.yaml', ()), 1, 1, 0)
+
+    text = describe_change(Change('command', words, changed, at, at))
+
+    old, new = text.removesuffix(' (a.yaml:1)').removeprefix('command ').split(' → ')
+    assert 'word_30' in old
+    assert 'other' in new
+    assert all(len(each) <= 62 and each[0] + each[-1] == '……' for each in (old, new))

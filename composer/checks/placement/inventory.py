@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from composer.language.specs import HostSpec, NetworkSpec
 
 _ROOT = 'root'
+# Also of a domain, as in name@example.org. Helps show it in lines for a shell.
+_USER = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.@-]{0,255}\$?', re.ASCII)
 # What is written with an address elsewhere, and where it is written here.
 _REPAIRS = (
     (re.compile(r'-.*'), 'programs would take it for an option'),
@@ -72,6 +74,14 @@ def _check_address(context: CheckContext, host: HostSpec) -> Iterator[Diagnostic
 
 
 def _check_user(context: CheckContext, host: HostSpec) -> Iterator[Diagnostic]:
+    if host.user and not _USER.fullmatch(host.user):
+        yield context.at_value(
+            (*host.path, 'user'),
+            'bad-value',
+            f"expected the name of a user; got '{host.user}'",
+            help='a name has letters, digits, dashes, underscores and dots',
+        )
+        return
     if host.systemd == 'system' and host.user != _ROOT:
         yield context.at_value(
             (*host.path, 'systemd'),

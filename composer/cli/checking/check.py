@@ -124,7 +124,12 @@ def _inspect(words: Sequence[str], options: CheckOptions) -> Report:
             nodes = len(system.spec.nodes) if system.spec else None
             crossings = tuple(map(str, list_crossings(context))) if context else ()
             name = str(system.path)
-            checked.append(CheckedFile(name, kept, nodes, given, combination, crossings=crossings))
+            processes = len(system.spec.processes) if system.spec else 0
+            checked.append(
+                CheckedFile(
+                    name, kept, nodes, given, combination, crossings=crossings, processes=processes
+                )
+            )
         files += name_combinations(checked)
     files += [_check_scenarios(path, catalogue, absent, options) for path in scenarios]
     unchecked = _list_unchecked(catalogue, imports, absent)

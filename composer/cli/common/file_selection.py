@@ -6,6 +6,7 @@ import glob
 import os
 import re
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -38,6 +39,7 @@ _SIMILAR = 0.8
 
 _TOP_KEY = re.compile(r'^(["\']?)([A-Za-z]\w*)\1\s*:(?=\s|$)', re.MULTILINE)
 _FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes)["\']?\s*:')
+_VERSION = re.compile(r'^["\']?version["\']?\s*:|^\s*\{', re.MULTILINE)
 _LIST = re.compile(r'\s*(#[^\n]*\n\s*)*(-\s|\[)')
 # Other keys, such as `parameters`, stand in other people's files, too.
 _ENTITIES = re.compile(rf'^\s+({"|".join(sorted(WORK_KEYS))})\s*:', re.MULTILINE)
@@ -240,9 +242,32 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
             for each in walk_yaml_files(path)
             if is_scenario_file(each) or looks_like_system(each)
         ]
-        yield from ((inside, False) for inside in found)
+        layers = _find_layers(found)
+        yield from ((inside, False) for inside in found if _identity(inside) not in layers)
         if not found:
             yield None, False
+
+
+def _find_layers(found: Sequence[Path]) -> set[str]:
+    """Return the files that others name as their layers, under `check:` or in scenarios."""
+    layers: set[str] = set()
+    if all(map(_has_version, found)):
+        return layers
+    for path in found:
+        data = read_document(path).data or {}
+        named = data.get('check')
+        for entry in (*(named.values() if isinstance(named, dict) else ()), data.get('system')):
+            texts = entry.get('layers') if isinstance(entry, dict) else None
+            for text in texts if isinstance(texts, list) else ():
+                layers.add(_identity(path.parent / str(text)))
+    return layers
+
+
+def _has_version(path: Path) -> bool:
+    with suppress(UnreadableFileError):
+        text = read_file(path)[:_MAX_BYTES_READ].decode('utf-8-sig', errors='replace')
+        return is_scenario_file(path) or bool(_VERSION.search(text))
+    return True
 
 
 def match_pattern(pattern: str) -> list[str]:

@@ -29,6 +29,8 @@ def import_command(
 ) -> int:
     """Turn the launch file FILE into a system.
 
+    This runs the code of the launch file, and the commands in it: import only what you trust.
+
     It is resolved by the installed launch and launch_ros, with these values for its arguments. All
     of its arguments remain arguments of the system. What cannot be kept is a comment with the line
     that it comes from.

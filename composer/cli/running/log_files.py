@@ -16,7 +16,7 @@ from composer.errors import ComposerError, ExitCode, UsageError
 from composer.runtime.control.name_claim import list_claims
 from composer.runtime.environment import check_shell, find_log_folder
 from composer.spelling import suggest
-from composer.terminal import escape_output
+from composer.terminal import escape_output, is_output_unread
 
 if TYPE_CHECKING:
     from typing import BinaryIO
@@ -102,7 +102,7 @@ def _follow(stream: BinaryIO, pid: int) -> None:
         return
     try:
         has_ended = False
-        while not has_ended:
+        while not (has_ended or is_output_unread()):
             has_ended = bool(select.select([process], [], [], _POLL_SEC)[0])
             _copy(stream)
     finally:

@@ -6,7 +6,7 @@ import json
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,7 @@ from composer.cli.running.top_table import (
 )
 from composer.errors import ComposerError, ExitCode
 from composer.runtime.control import protocol
+from composer.terminal import is_output_unread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,7 +54,7 @@ def top(
         system = Discovery(client).find(name)
         with client.asking(system, protocol.TOP) as ask:
             if each_period:
-                _print_each(ask)
+                return _print_each(ask)
             if once or format_name == 'json' or not has_screen():
                 document = _wait_for_all(ask)
                 print_health(document, view, format_name)
@@ -85,14 +86,15 @@ def _read(outcome: Outcome) -> dict[str, Any]:
     return answer_forms.read_answer(outcome.text, answer_forms.TOP)
 
 
-def _print_each(ask: Callable[[float], Outcome]) -> NoReturn:
+def _print_each(ask: Callable[[float], Outcome]) -> int:
     printed = None
-    while True:
+    while not is_output_unread():
         document = _read(ask(STATUS_SEC))
         if document['period'] != printed:
             click.echo(json.dumps(document))
             printed = document['period']
         time.sleep(max(_POLL_SEC, document['period_sec'] / 2))
+    return ExitCode.DONE
 
 
 def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:

@@ -40,6 +40,8 @@ def show_command(
 ) -> int:
     """Print the final system, with everything resolved.
 
+    This runs the commands that values of the file are read from: show only what you trust.
+
     Includes, layers, arguments and expressions are replaced by what they result in. The output
     is a valid system itself. Takes LAYER and NAME:=VALUE as `composer up` does.
     """

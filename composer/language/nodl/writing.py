@@ -47,11 +47,15 @@ def _end(section: str, name: str, entry: str | Mapping[str, Any]) -> dict[str, A
 
 
 def _policies(qos: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    # What is in neither may be unknown: middlewares tell others nothing of it.
+    is_told = not qos.keys().isdisjoint(('history', 'depth'))
     whole = {**BUILTIN_PROFILES[DEFAULT_PROFILE], 'liveliness': 'automatic', **qos}
     for policy, value in whole.items():
         if policy in DURATION_KEYS:
             yield f'{policy}_ns', round(value * NANOSECONDS)
-        elif policy != 'depth' or whole['history'] == 'keep_last':
+        elif policy not in ('history', 'depth') or (
+            is_told and (policy == 'history' or whole['history'] == 'keep_last')
+        ):
             yield policy, value.upper() if isinstance(value, str) else value
 
 
