@@ -141,16 +141,19 @@ class EntityCreation:
         if is_qos_profile(data.get('qos')):
             data['qos'] = write_policies(data['qos'])
         if behaviour is not None:
-            if not callable(behaviour):
-                message = f'a behaviour must be a function, not {behaviour!r}'
+            data['behaviour'] = behaviour
+        given = {each.key: data[each.key] for each in kind.behaviours if each.key in data}
+        for key, function in given.items():
+            if not callable(function):
+                message = f'a behaviour must be a function, not {function!r}'
                 raise EntityError(message)
-            data['behaviour'] = f'{_CREATED}:behaviour'
+            data[key] = f'{_CREATED}:{key}'
         problem = find_problem({'nodes': {node.spec.name: {section: {'created': data}}}})
         if problem is not None:
             message = f'a {kind.noun} cannot be created: {problem}'
             raise EntityError(message)
         with self._lock:
-            return self._make(node, section, data, (asked, default_name), behaviour)
+            return self._make(node, section, data, (asked, default_name), given)
 
     def _make(
         self,
@@ -158,7 +161,7 @@ class EntityCreation:
         section: str,
         data: dict[str, Any],
         names: tuple[str | None, str],
-        behaviour: Callable[..., Any] | None,
+        given: Mapping[str, Callable[..., Any]],
     ) -> CreatedEntity:
         from composer.language.parsing.entity_parser import parse_entity
 
@@ -174,9 +177,9 @@ class EntityCreation:
         name = asked or default_name
         while name in taken:
             name = next(numbered)
-        if behaviour is not None:
-            data['behaviour'] = f'{_CREATED}:{section}/{name}'
-            node.created[data['behaviour']] = behaviour
+        for key, function in given.items():
+            data[key] = f'{_created_name(section, name)}{key}'
+            node.created[data[key]] = function
         path = (*node.spec.path, section, name)
         spec = parse_entity(section, node.options(), name, data, path)
         try:
@@ -195,9 +198,16 @@ class EntityCreation:
             if not created.is_of(node.entities):
                 return
             node.entities[created.section].pop(created.name)
-            node.created.pop(f'{_CREATED}:{created.section}/{created.name}', None)
+            start = _created_name(created.section, created.name)
+            for each in [each for each in node.created if each.startswith(start)]:
+                del node.created[each]
         created.remove()
         node.forget(KIND_OF_SECTION[created.section].noun, created.name)
+
+
+def _created_name(section: str, name: str) -> str:
+    """Return how the names of the functions of an entity begin."""
+    return f'{_CREATED}:{section}/{name} '
 
 
 def _name_of_type(of_type: Any, folder: str) -> Any:

@@ -44,6 +44,7 @@ from rclpy.parameter_service import ParameterService
 from composer.ament import remaps_actions
 from composer.names import expand_name
 from composer.runtime.logs import has_rosout_publisher
+from composer.runtime.nodes.node_logger import NodeLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -88,6 +89,7 @@ class ComposedRosNode(Node):
 
             given = find_names_given(ros_arguments, spec.full_name)
         self.from_files = {name: entries[name] for name in entries if name not in given}
+        self._node_logger: NodeLogger | None = None
         self._late_events: _LatePublisher | None = None
         hooks = spec.before_parameters_set, spec.on_parameters, spec.after_parameters_set
         has_parameters = bool(spec.parameters) or spec.has_other_parameters or any(hooks)
@@ -126,6 +128,12 @@ class ComposedRosNode(Node):
             lambda: self.create_publisher(msg_type, topic, *arguments, **options)
         )
         return self._late_events
+
+    def get_logger(self) -> NodeLogger:
+        """Return the logger, which takes any level from any line of code."""
+        if self._node_logger is None:
+            self._node_logger = NodeLogger(super().get_logger().name)
+        return self._node_logger
 
     def resolve_action_name(self, name: str) -> str:
         """Return the full name of an action, which newer versions of ROS remap as a topic."""
