@@ -17,9 +17,11 @@ _RESERVED = frozenset(
 ) | {'True', 'False', 'None'}
 
 
-_WITH_SEPARATORS = re.compile(r'[^\W\d]\w*([.-]\w+)+')
+_WITH_SEPARATORS = re.compile(r'[^\W\d]\w*([./-]\w+)+')
 # The name under which an expression finds all arguments of its file, as in `args['a.b']`.
 ARGUMENTS = 'args'
+# Among the names that an expression uses: all of them, and not the argument of that name.
+ALL_ARGUMENTS = 'args[]'
 # The names that stand for something in every expression.
 BUILT_IN = frozenset((ARGUMENTS, 'env', 'find', 'here', 'range'))
 
@@ -30,15 +32,14 @@ def is_variable_name(name: str) -> bool:
 
 
 def is_argument_name(name: str) -> bool:
-    """Return whether an expression can use the name of an argument, with dots or dashes in it."""
-    return name != ARGUMENTS and (
-        is_variable_name(name) or _WITH_SEPARATORS.fullmatch(name) is not None
-    )
+    """Return whether an expression can use the name of an argument: also with `.`, `-`, `/`."""
+    return is_variable_name(name) or _WITH_SEPARATORS.fullmatch(name) is not None
 
 
 def written_in_expression(name: str) -> str:
     """Return how an expression writes the name of an argument."""
-    return name if is_variable_name(name) else f"{ARGUMENTS}['{name}']"
+    is_plain = is_variable_name(name) and name not in BUILT_IN
+    return name if is_plain else f"{ARGUMENTS}['{name}']"
 
 
 def is_conditional(entry: Any) -> bool:

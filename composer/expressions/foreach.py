@@ -136,7 +136,9 @@ class _Expansion:
                 raise _TooManyError
             for evaluator in scopes:
                 holds = self._holds(evaluator, entry.get(_WHEN, True), (*path, _WHEN))
-                self._add(evaluator, written, body, variables, is_left_out=not holds)
+                # With other arguments it may be there, and then its values are other ones.
+                given = evaluator if holds else evaluator.of_samples()
+                self._add(given, written, body, variables, is_left_out=not holds)
                 before = -1
             if len(self._document.diagnostics) > before >= 0:
                 # It is missing because of an error, not because there are no values.

@@ -14,7 +14,7 @@ from jinja2.parser import Parser
 from jinja2.runtime import new_context
 from jinja2.sandbox import SandboxedEnvironment, SandboxedFormatter
 
-from composer.expressions import ARGUMENTS, limits
+from composer.expressions import ALL_ARGUMENTS, ARGUMENTS, limits
 from composer.expressions.functions import FILTERS, FUNCTIONS
 from composer.records import record
 
@@ -203,9 +203,8 @@ class Sandbox(SandboxedEnvironment):
 def _names_of(parts: Sequence[nodes.Node]) -> frozenset[str]:
     names = [part.name for part in parts if isinstance(part, nodes.Name)]
     arguments = [name for part in parts if (name := _argument_of(part)) is not None]
-    if names.count(ARGUMENTS) == len(arguments):
-        names = [name for name in names if name != ARGUMENTS]
-    return frozenset((*names, *arguments))
+    every = () if names.count(ARGUMENTS) == len(arguments) else (ALL_ARGUMENTS,)
+    return frozenset((*(name for name in names if name != ARGUMENTS), *every, *arguments))
 
 
 def _argument_of(part: nodes.Node) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
-from composer.expressions import ARGUMENTS, BUILT_IN
+from composer.expressions import ALL_ARGUMENTS, ARGUMENTS, BUILT_IN
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Scope:
 
     def has_samples(self, names: Collection[str]) -> bool:
         """Return whether one of some names has a sample as its value."""
-        used = {*names, *self.arguments} if ARGUMENTS in names else names
+        used = {*names, *self.arguments} if ALL_ARGUMENTS in names else names
         return not frozenset(self.samples).isdisjoint(used)
 
     @property

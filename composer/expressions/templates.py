@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import suppress
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,10 @@ _MAX_BITS = 1024
 _MOST_SEARCHED = 100
 
 
+# Where `none` is no value of its own.
+_MAY_LACK_VALUES = (('processes',), ('containers',), ('environment',))
+
+
 class TemplateEvaluator:
     """Evaluates the expressions of one document.
 
@@ -86,6 +91,10 @@ class TemplateEvaluator:
         """Return an evaluator with one more name in scope, for the same document."""
         return self.in_scope(self.scope.within(name, value, origin, is_sample=is_sample))
 
+    def of_samples(self) -> TemplateEvaluator:
+        """Return an evaluator for which all values only stand for others of their type."""
+        return self.in_scope(replace(self.scope, samples=frozenset(self.scope.values)))
+
     def names_in(self, data: Any) -> frozenset[str]:
         """Return the names that the expressions in data use, as far as they can be read."""
         if isinstance(data, dict):
@@ -103,7 +112,8 @@ class TemplateEvaluator:
         if isinstance(data, dict):
             return self.evaluate_mapping(data, path)
         if isinstance(data, list):
-            return [self.evaluate(item, (*path, index)) for index, item in enumerate(data)]
+            items = ((self.evaluate(item, (*path, at)), item) for at, item in enumerate(data))
+            return [found for found, item in items if not _is_left_out(found, item, path)]
         if isinstance(data, str) and OPEN in data:
             return self._evaluate(data, path)
         return data
@@ -118,7 +128,9 @@ class TemplateEvaluator:
                 continue
             if key != written:
                 self.positions.move((*path, written), (*path, key))
-            filled[key] = self.evaluate(value, (*path, key))
+            found = self.evaluate(value, (*path, key))
+            if not _is_left_out(found, value, path):
+                filled[key] = found
         return filled
 
     def evaluate_key(self, path: DataPath) -> str:
@@ -184,7 +196,9 @@ class TemplateEvaluator:
     def _value_of(self, text: str, expression: slice, span: Span) -> Any:
         scope, code = self._values, code_of(text, expression)
         if ARGUMENTS in code:
-            scope = {ARGUMENTS: self.scope.argument_values(), **scope}
+            every = {ARGUMENTS: self.scope.argument_values()}
+            is_one, scope = ARGUMENTS in self.scope.arguments, {**every, **scope}
+            scope |= every if is_one else {}
         if 'here' in self._names_in(text, [expression]):
             scope = {'here': os.path.realpath(span.source.folder), **scope}
         value = _as_data(evaluate_expression(self._sandbox, code, scope))
@@ -262,6 +276,11 @@ class TemplateEvaluator:
                 related=[Related('also used here', self.positions.key(other))],
             )
         )
+
+
+def _is_left_out(found: Any, written: Any, path: DataPath) -> bool:
+    """Return whether an expression leaves a key or an item of a program out: its value is none."""
+    return found is None and written is not None and path[:1] in _MAY_LACK_VALUES
 
 
 def _describe(error: Exception) -> str:

@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import UsageError
-from composer.expressions import ARGUMENTS, is_argument_name
+from composer.expressions import is_argument_name
 from composer.language.values.start_values import SOURCE_KEYS, SOURCES
 from composer.records import record
 from composer.ros_parameters.parameter_types import (
@@ -182,9 +182,7 @@ def find_declaration_errors(
 
     A name that no expression can use, and a default or a choice that does not fit.
     """
-    if argument.name == ARGUMENTS:
-        yield (), f"'{ARGUMENTS}' stands for all arguments in expressions", 'choose another name'
-    elif not is_argument_name(argument.name):
+    if not is_argument_name(argument.name):
         yield (), f"'{argument.name}' cannot be used as a name in expressions", None
     choices = argument.choices
     default = None if argument.is_computed else argument.default

@@ -21,7 +21,10 @@ def read_condition(place: Place, condition: Any) -> Condition:
     if predicate is None:
         place.scope.fill(place.loader.context)
         place.remark('the condition was resolved')
-        return Condition('', bool(condition.evaluate(place.loader.context)))
+        with place.loader.reading() as read:
+            holds = bool(condition.evaluate(place.loader.context))
+        place.fix(read)
+        return Condition('', holds)
     value = Resolver(place).text(predicate)
     holds = truth_of(value)
     is_unless = 'UnlessCondition' in kinds

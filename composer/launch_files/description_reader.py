@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
-from composer.expressions import written_in_expression
 from composer.launch_files.conditions import read_condition
 from composer.launch_files.launched_programs import ProgramReader, ends_system
 from composer.launch_files.opaque import OpaqueRuns
@@ -19,8 +18,8 @@ from composer.launch_files.parameters import ParameterReader
 from composer.launch_files.place import join_namespaces, number_code
 from composer.launch_files.results import Argument, LaunchError
 from composer.launch_files.substitutions import Resolver, class_names, private
-from composer.launch_files.surroundings import Wait
-from composer.launch_files.texts import Text, chosen, joined, one
+from composer.launch_files.surroundings import Setting, Wait
+from composer.launch_files.texts import Text, joined, one
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -104,21 +103,11 @@ class DescriptionReader:
                 self.place.scope.configurations[name] = default
                 return
         choices = tuple(map(str, private(entity, 'choices') or ()))
-        given = self.place.given.get(name)
-        if given is None and default is None and known is None:
-            given = choices[0] if choices else None
-            if given is None:
-                message = f"{self.place.origin}: the launch file requires the argument '{name}'"
-                raise LaunchError(message, help=f'give it a value: {name}:=…')
-        if known is None:
-            description = private(entity, 'description') or ''
-            if description in ('no description given', f'One of: {list(choices)}'):
-                description = ''
-            self.place.result.arguments[name] = Argument(
-                name, default, description, choices, given
-            )
-        text = given if given is not None else (default.text if default else '')
-        self.place.scope.configurations[name] = one(written_in_expression(name), text)
+        description = private(entity, 'description') or ''
+        if description in ('no description given', f'One of: {list(choices)}'):
+            description = ''
+        argument = known or Argument(name, default, description, choices)
+        self.place.scope.configurations[name] = self.place.declare(argument)
 
     def _set(self, entity: Any) -> None:
         self.place.scope.set(
@@ -127,6 +116,7 @@ class DescriptionReader:
         )
 
     def _unset(self, entity: Any) -> None:
+        self.place.freeze(self.place.scope.when)
         self.place.scope.configurations.pop(
             self._resolver.text(private(entity, 'name')).text, None
         )
@@ -137,6 +127,7 @@ class DescriptionReader:
             self._resolver.text(name).text: self._resolver.text(value)
             for name, value in kept.items()
         }
+        self.place.freeze(self.place.scope.when)
         self.place.scope.configurations.clear()
         self.place.scope.configurations.update(values)
 
@@ -174,8 +165,9 @@ class DescriptionReader:
         path = Path(location.text)
         is_code = private(source, 'launch_description') is not None and not path.is_file()
         if path.is_file() or is_code or not location.text:
-            if not location.is_constant and not _is_in_package(location):
-                self.place.remark(f'which file is included depends on arguments; here {path.name}')
+            if self.place.freeze(location):
+                what = 'which file is included depends on arguments'
+                self.place.remark(f'{what}; here {path.name}')
             self.place.scope.fill(self.place.loader.context)
             return self.place.loader.load(source, self.place.scope.file)
         self.place.remark(f"'{location.text}' is not here: ros2 launch will run it")
@@ -240,6 +232,7 @@ class DescriptionReader:
 
     def _unset_variable(self, entity: Any) -> None:
         name = self._resolver.text(private(entity, 'name')).text
+        self.place.freeze(self.place.scope.when)
         if name in self.place.scope.environment:
             del self.place.scope.environment[name]
         self.place.remark(f'the environment variable {name} is unset: a process cannot unset one')
@@ -262,36 +255,27 @@ class DescriptionReader:
     def _namespace(self, entity: Any) -> None:
         own = self._resolver.text(private(entity, 'namespace'))
         outer = self.place.scope.configurations.get('ros_namespace')
-        full = join_namespaces(outer, own)
-        if self.place.scope.when:
-            before = outer or Text(())
-            full = chosen(self.place.scope.when, full, before, is_true=self.place.scope.holds)
-        self.place.scope.configurations['ros_namespace'] = full
+        self.place.scope.configurations.setdefault('ros_namespace', Text(()))
+        self.place.scope.set('ros_namespace', join_namespaces(outer, own))
 
     def _remap(self, entity: Any) -> None:
         rule = tuple(self._resolver.text(private(entity, each)) for each in ('src', 'dst'))
-        self._common('ros_remaps').append(
-            (self.place.scope.when, *rule) if self.place.scope.when else rule
-        )
+        self._set_for_all('ros_remaps', rule)
 
     def _parameter(self, entity: Any) -> None:
-        reader = ParameterReader(self.place)
-        values = reader.values(private(entity, 'param_dict'))
-        if self.place.scope.when:
-            self.place.remark(
-                f'SetParameter has a condition, {self.place.scope.when}, which was resolved'
-            )
-        if self.place.scope.holds:
-            self._common('global_params').extend(values.items())
+        values = ParameterReader(self.place).values(private(entity, 'param_dict'))
+        for pair in values.items():
+            self._set_for_all('global_params', pair)
 
     def _parameter_file(self, entity: Any) -> None:
         path = self._resolver.text(private(entity, 'input_file') or private(entity, 'param_file'))
-        self._common('global_params').append(path)
+        self._set_for_all('global_params', path)
 
-    def _common(self, name: str) -> list[Any]:
+    def _set_for_all(self, name: str, value: Any) -> None:
         # As in launch, a list that is there already is shared with the scopes around.
-        found: list[Any] = self.place.scope.configurations.setdefault(name, [])
-        return found
+        scope = self.place.scope
+        common = scope.configurations.setdefault(name, [])
+        common.append(Setting(value, scope.codes, scope.holds))
 
     def _sim_time(self, entity: Any) -> None:
         self.place.remark(f'{describe(entity)} is about the node of ros2 launch itself')
@@ -318,10 +302,12 @@ class DescriptionReader:
             return
         self.place.scope.fill(self.place.loader.context)
         try:
-            further = entity.execute(self.place.loader.context)
+            with self.place.loader.reading() as read:
+                further = entity.execute(self.place.loader.context)
         except Exception as error:  # noqa: BLE001 - it is foreign code
             self.place.remark(f'{describe(entity)} cannot be kept: {error}')
             return
+        self.place.fix(read)
         self.place.remark(f'{describe(entity)} was resolved')
         self.read(further or ())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from composer.launch_files.parameters import ParameterReader
 from composer.launch_files.place import join_namespaces
 from composer.launch_files.substitutions import Resolver, class_names, private, truth_of
 from composer.launch_files.surroundings import Wait
-from composer.launch_files.texts import Computed, Text, joined
+from composer.launch_files.texts import Computed, Text, chosen, joined, only_if
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -22,6 +23,11 @@ if TYPE_CHECKING:
 _ROS_ARGS = '--ros-args'
 _LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 _LOADER = 'component_container'
+# A prefix that only lets the program start later.
+SLEEP = re.compile(
+    r"""\s*(?:\S*/)?(?:ba)?sh -c (["'])sleep ([\d.]+)s?\s*(?:;|&&)\s*"""
+    r"""(?:exec\s+)?[^\w']*\$0[^\w']*\$@[^\w']*\1\s*"""
+)
 # What lifecycle transitions lead to, with `lifecycle:` of a process.
 _TRANSITIONS = {1: 'inactive', 3: 'active'}
 
@@ -52,7 +58,13 @@ class ProgramReader:
         if entry is None:
             self._place.remark('what ends the system is not among its processes')
         else:
-            entry.data['on_exit'] = 'shutdown'
+            self._set_if_held(entry, 'on_exit', 'shutdown')
+
+    def _set_if_held(self, entry: Entry, key: str, value: str) -> None:
+        """Set a key of an entry to a value if the conditions hold here, and not only there."""
+        scope = self._place.scope
+        when = '' if scope.when == entry.when else scope.when
+        entry.data[key] = only_if(when, value, entry.data.get(key), is_true=scope.holds)
 
     def read_event(self, entity: Any) -> None:
         """Read an event that is emitted at once: a transition of a lifecycle node."""
@@ -86,7 +98,7 @@ class ProgramReader:
             return
         for entry in matching:
             if entry.data.get('lifecycle') != 'active':
-                entry.data['lifecycle'] = state
+                self._set_if_held(entry, 'lifecycle', state)
 
     def _entry_of(self, target: Any) -> Entry | None:
         entries = self._place.result.entries
@@ -130,12 +142,17 @@ class ProgramReader:
             data['components'] = {}
             for component in private(action, 'composable_node_descriptions') or ():
                 self._add_component(entry, component)
-        if 'LifecycleNode' in kinds and self._is_started(action):
-            data['lifecycle'] = 'active'
+        if 'LifecycleNode' in kinds and (written := private(action, 'autostart')):
+            self._start_lifecycle(data, resolver.is_true(written))
 
-    def _is_started(self, action: Any) -> bool:
-        written = private(action, 'autostart')
-        return bool(written) and truth_of(Resolver(self._place).is_true(written))
+    @staticmethod
+    def _start_lifecycle(data: dict[str, Any], autostart: Text) -> None:
+        holds = truth_of(autostart)
+        if not autostart.is_constant:
+            code = f'({autostart.condition()})'
+            data['lifecycle'] = only_if(code, 'active', None, is_true=holds)
+        elif holds:
+            data['lifecycle'] = 'active'
 
     def read_components(self, action: Any) -> None:
         """Add components to a container: one of the system, or one that runs already."""
@@ -155,6 +172,8 @@ class ProgramReader:
             ]
             full = f'/{values[1] or ""}/{values[0]}'.replace('//', '/').replace('//', '/')
             if entry.section == 'containers' and name.text in (values[0], full, full.lstrip('/')):
+                is_same = name.written() in (own, f'/{own}', full, full.lstrip('/'))
+                self._place.freeze(*() if is_same else (name, _text_of(own), _text_of(namespace)))
                 return entry
         key = f'/{name.text.lstrip("/")}'
         if not name.is_constant:
@@ -198,10 +217,14 @@ class ProgramReader:
             label = plugin.text.rpartition(':')[2]
             place.remark(f"{plugin.text} has no name of its own here: '{label}' is its node")
         components: dict[str, Any] = entry.data['components']
-        if label in components:
+        if label in components and not when:
             place.remark(f"a second component '{label}' of one container is left out")
-        else:
-            components[label] = data
+            return
+        while label in components:
+            # Another expression for the same name: only one of them is there at a time.
+            code = label[len('{{ ') : -len(' }}')] if isinstance(label, Computed) else repr(label)
+            label = Computed(f'{{{{ ({code}) }}}}', label)
+        components[label] = data
 
     def _read_process(self, action: Any) -> None:
         resolver = Resolver(self._place)
@@ -261,17 +284,17 @@ class ProgramReader:
 
     def _add_remaps(self, data: dict[str, Any], written: Any) -> None:
         resolver = Resolver(self._place)
-        rules: dict[str, str] = {}
-        for rule in self._place.scope.configurations.get('ros_remaps', ()):
-            *condition, source, target = rule
-            if condition:
-                self._place.remark(f'SetRemap depends on {condition[0]}, and is left out')
-                continue
-            rules.setdefault(source.written(), target.written())
-        for source, target in written:
-            rules.setdefault(resolver.text(source).written(), resolver.text(target).written())
+        rules: dict[str, Text] = {}
+        own = [(*map(resolver.text, pair), '') for pair in written]
+        common = self._place.scope.configurations.get('ros_remaps', ())
+        every = [(*each.value, self._place.scope.besides(each), each.holds) for each in common]
+        # The first rule for a name that holds; without one, the name itself.
+        for source, target, when, *holds in reversed([*every, *own]):
+            key = source.written()
+            before = rules.get(key, source)
+            rules[key] = chosen(when, target, before, is_true=all(holds)) if when else target
         if rules:
-            data['remap'] = rules
+            data['remap'] = {key: rules[key].written() for key in reversed(rules)}
 
     def _add_keys(self, data: dict[str, Any], action: Any) -> None:
         """Add what all processes have."""
@@ -293,7 +316,11 @@ class ProgramReader:
             cwd = resolver.text(private(description, 'cwd'))
             data['cwd'] = cwd.written() if cwd.text.startswith('/') else _beside(cwd)
         prefix = resolver.text(private(description, 'prefix'))
-        if prefix.text.strip():
+        if (sleep := SLEEP.fullmatch(prefix.text)) and prefix.is_constant:
+            data['delay'] = float(sleep[2])
+        elif prefix.parts:
+            place.freeze(prefix)
+        if prefix.text.strip() and 'delay' not in data:
             place.remark(f"the prefix '{prefix.text}' cannot be kept")
         self._add_restart(data, action)
         timeouts = [
@@ -326,6 +353,10 @@ class ProgramReader:
             )
             total = sum(float(each.text or 5) for each in timeouts)
             data['stop'] = {'timeout': Computed(f'{{{{ {" + ".join(terms)} }}}}', total)}
+
+
+def _text_of(value: Any) -> str:
+    return str(value) if isinstance(value, Computed) else ''
 
 
 def _seconds(text: Text) -> Any:

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.substitutions import Resolver, class_names, private, read_file
-from composer.launch_files.texts import Computed, Text, constant, read_yaml
+from composer.launch_files.texts import Computed, Text, constant, only_if, read_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from composer.launch_files.place import Place
+    from composer.launch_files.surroundings import Setting
 
 
 @dataclass
@@ -44,6 +45,7 @@ class ParameterReader:
     """Reads the parameters of nodes at one place of a launch file."""
 
     def __init__(self, place: Place) -> None:
+        self._place = place
         self._resolver = Resolver(place)
         self._remark = place.remark
         self._parse = place.loader.parse
@@ -56,10 +58,7 @@ class ParameterReader:
         """
         read = Parameters()
         for item in common:
-            if isinstance(item, tuple):
-                self._add_values(read, {item[0]: item[1]})
-            else:
-                read.files.append(item.written())
+            self._add_common(read, item)
         for item in given:
             kinds = class_names(item)
             if 'ParameterFile' in kinds:
@@ -69,6 +68,21 @@ class ParameterReader:
             else:
                 self._add_values(read, self.values(item))
         return read
+
+    def _add_common(self, read: Parameters, item: Setting) -> None:
+        when = self._place.scope.besides(item)
+        if isinstance(item.value, Text):
+            path = item.value.written()
+            read.files.append(only_if(when, path, None, is_true=item.holds))
+            return
+        name, value = item.value
+        if when and (read.files or isinstance(value, dict)):
+            self._place.freeze(when)
+            when = ''
+            if not item.holds:
+                return
+        value = only_if(when, value, read.values.get(name), is_true=item.holds)
+        self._add_values(read, {name: value})
 
     def values(self, written: Mapping[Any, Any]) -> dict[str, Any]:
         """Return the values of a mapping that `launch_ros` has normalized."""
@@ -136,32 +150,39 @@ class ParameterReader:
 
     def _add_file(self, read: Parameters, item: Any) -> None:
         written = private(item, 'param_file')
+        substitutes = private(item, 'allow_substs')
         if (
             isinstance(written, list)
             and len(written) == 1
-            and self._add_rewritten(read, written[0])
+            and isinstance(substitutes, bool | None)
+            and self._add_rewritten(read, written[0], is_template=bool(substitutes))
         ):
             return
         path = self._resolver.text(written)
-        substitutes = private(item, 'allow_substs')
         is_template = substitutes is True or (
             substitutes is not False and self._resolver.text(substitutes).text.lower() == 'true'
         )
-        if is_template:
-            data = read_file(path.text)
-            if not isinstance(data, dict):
-                self._remark(f"'{path.text}' cannot be read: its substitutions are kept as text")
-            else:
-                read.files.append(NewFile(self._translated(data)))
-                return
+        if not (isinstance(substitutes, bool | None)):
+            self._place.freeze(self._resolver.text(substitutes))
+        data = read_file(path.text) if is_template else {}
+        if not isinstance(data, dict):
+            self._remark(f"'{path.text}' cannot be read: its substitutions are kept as text")
+        elif '$(' in str(data):
+            # It is copied, whichever file that is.
+            self._place.freeze(path)
+            read.files.append(NewFile(self._translated(data)))
+            return
         if Path(path.text).is_file() or not Path(path.text).parent.is_dir():
             read.files.append(path.written())
             if self._resolver.is_new_file(path.text):
                 self._keep_content(read, path)
         else:
             self._remark(f"there is no parameter file '{path.text}': launch goes on without it")
+            if self._place.depends(path):
+                is_other = f'{path.code} != {path.text!r}'
+                read.files.append(only_if(is_other, path.written(), None, is_true=False))
 
-    def _add_rewritten(self, read: Parameters, written: Any) -> bool:
+    def _add_rewritten(self, read: Parameters, written: Any, *, is_template: bool) -> bool:
         """Add nav2's `RewrittenYaml`: a file, and the values that it gives to names in it."""
         rewrites = private(written, 'param_rewrites')
         if 'RewrittenYaml' not in class_names(written) or private(written, 'key_rewrites'):
@@ -169,7 +190,8 @@ class ParameterReader:
         resolver = self._resolver
         path = resolver.text(private(written, 'source_file'))
         data = read_file(path.text)
-        if not isinstance(data, dict) or '$(' in str(data) or any('.' in key for key in rewrites):
+        has_substitutions = is_template and '$(' in str(data)
+        if not isinstance(data, dict) or any('.' in key for key in rewrites):
             return False
         is_typed = bool(private(written, 'convert_types'))
         by_name, by_value = (
@@ -180,7 +202,12 @@ class ParameterReader:
             for given in (rewrites, private(written, 'value_rewrites'))
         )
         root = resolver.text(private(written, 'root_key')).written()
-        read.files.append({'file': path.written(), 'root': root} if root else path.written())
+        # What else is in the file, and where, is that of the file as it is now.
+        self._place.freeze(path)
+        if has_substitutions:
+            read.files.append(NewFile(self._translated(data), root))
+        else:
+            read.files.append({'file': path.written(), 'root': root} if root else path.written())
         changed = _rewritten(data, by_name, by_value)
         if changed:
             read.files.append(NewFile(changed, root))

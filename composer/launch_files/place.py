@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.expressions import written_in_expression
-from composer.launch_files.results import Entry, Imported
+from composer.launch_files.results import Argument, Entry, Imported, LaunchError
 from composer.launch_files.surroundings import Scope
 from composer.launch_files.texts import Computed, Text, joined, one
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from composer.launch_files.loading import Loader
+
+# A constant in an expression, and not the name in `args['name']`.
+_CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
 
 
 class Place:
@@ -45,24 +48,51 @@ class Place:
         if remark not in self.result.remarks:
             self.result.remarks.append(remark)
 
+    def declare(self, argument: Argument) -> Text:
+        """Declare an argument, and return its value.
+
+        Raises:
+            LaunchError: It needs a value to be imported with.
+        """
+        name, default = argument.name, argument.default
+        text = self.given.get(name) or (default.text if default else None)
+        if text is None and name not in self.given:
+            text = next(iter(argument.choices), None)
+        if text is None and name not in self.given:
+            message = f"{self.origin}: the launch file requires the argument '{name}'"
+            raise LaunchError(message, help=f'give it a value: {name}:=…')
+        argument.given = self.given.get(name, text or '')
+        self.result.arguments.setdefault(name, argument)
+        return one(written_in_expression(name), argument.given)
+
     def fix(self, names: Iterable[str]) -> None:
         """Note that the value of a configuration decides what foreign code does."""
-        codes = {
-            part.code
-            for name in names
-            if isinstance(value := self.scope.configurations.get(name), Text)
-            for part in value.parts
-            if not isinstance(part, str)
-        }
-        for argument in self.result.arguments.values():
-            # Expressions may hold several arguments.
-            if any(
-                re.search(
-                    rf'(?<![\w.]){re.escape(written_in_expression(argument.name))}(?!\w)', code
-                )
-                for code in codes
-            ):
+        values = map(self.scope.configurations.get, names)
+        self.freeze(*(each for each in values if isinstance(each, Text)))
+
+    def freeze(self, *used: Text | str) -> bool:
+        """Keep the arguments in texts and expressions as they are; return whether there are any.
+
+        For what cannot follow them: it was read or decided by the import.
+        """
+        found = self.depends(*used)
+        for argument in found:
+            if not argument.fixed:
                 argument.fixed = True
+                self.freeze(argument.default or '')
+        return bool(found)
+
+    def depends(self, *used: Text | str) -> list[Argument]:
+        """Return the arguments in texts and expressions."""
+        codes = ' '.join(each if isinstance(each, str) else each.code for each in used)
+        codes = _CONSTANT.sub("''", codes)
+        return [
+            argument
+            for argument in self.result.arguments.values()
+            if re.search(
+                rf'(?<![\w.]){re.escape(written_in_expression(argument.name))}(?!\w)', codes
+            )
+        ]
 
     def add(self, section: str, name: str, data: dict[str, Any], action: Any) -> Entry:
         """Add an entry to the system."""
@@ -73,7 +103,12 @@ class Place:
             name = f'{plain}_{number}'
             number += 1
         if self.scope.delay is not None:
-            data['delay'] = number_value(self.scope.delay)
+            own = data.get('delay', 0.0)
+            code = f'{number_code(self.scope.delay)} + {own}'
+            total = one(code, str(float(self.scope.delay.text) + own), 'number')
+            data['delay'] = number_value(total if own else self.scope.delay)
+            if self.scope.delay.is_constant:
+                data['delay'] = float(total.text)
         entry = Entry(
             section,
             name,
@@ -101,6 +136,8 @@ class Place:
             list(self.scope.waits),
             self.scope.delay,
             self.scope.file,
+            list(self.scope.configuration_stack),
+            list(self.scope.environment_stack),
         )
         other.result.arguments = {
             name: replace(each) for name, each in self.result.arguments.items()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from composer.launch_files.surroundings import Wait
@@ -24,15 +25,24 @@ class Argument:
 
     Attributes:
         default: `None` if a value is required.
+        given: The value that it is imported with.
         fixed: Whether functions of the launch file depend on its value, so that it cannot change.
     """
 
     name: str
     default: Text | None
-    description: str
-    choices: tuple[str, ...]
-    given: str | None = None
+    description: str = ''
+    choices: tuple[str, ...] = ()
+    given: str = ''
     fixed: bool = False
+
+    @property
+    def is_fixed_expression(self) -> bool:
+        """Whether it keeps a default that is computed, and that nobody has given."""
+        default = self.default
+        is_computed = default is not None and not default.is_constant
+        has_default = default is not None and default.text == self.given
+        return self.fixed and is_computed and has_default and self.name.isidentifier()
 
 
 @dataclass
@@ -65,3 +75,11 @@ class Imported:
     entries: list[Entry] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+
+    def words(self, given: Mapping[str, str]) -> list[str]:
+        """Return the arguments that the system is imported with, as on a command line."""
+        return [
+            f'{name}:={each.given}'
+            for name, each in self.arguments.items()
+            if name in given or each.default is None
+        ]

@@ -16,7 +16,7 @@ import yaml
 from composer.ament import find_share
 from composer.launch_files.marks import run_marked
 from composer.launch_files.python_expressions import UnlikeError, translate
-from composer.launch_files.results import LaunchError
+from composer.launch_files.results import Argument, LaunchError
 from composer.launch_files.texts import (
     EMPTY,
     Code,
@@ -38,6 +38,11 @@ if TYPE_CHECKING:
 _SHARE = re.compile(r'^(?:file://)?(/[^\s:]*?)/share/([A-Za-z]\w*)(?=/|$)')
 # What `LaunchConfigAsBool` takes for true.
 _TRUE = ('true', '1', 'yes', 'on')
+# What launch itself reads, for each program: arguments only where a launch file declares them.
+_OF_LAUNCH = (
+    *('launch-prefix', 'launch-prefix-filter', 'sigterm_timeout', 'sigkill_timeout'),
+    *('emulate_tty', 'output', 'log_file_name', 'ros_namespace'),
+)
 # Where the files of packages would be that are not installed.
 _ABSENT = '/share/of/package'
 
@@ -137,13 +142,20 @@ class Resolver:
         if isinstance(value, Text):
             return value
         default = private(written, 'default')
-        if name in self._place.given:
-            return _constant(self._place.given[name])
-        if default is None:
+        if name in _OF_LAUNCH and default is not None:
+            return self.text(default)
+        if default is None and name not in self._place.given:
             origin = self._place.origin
             message = f"{origin}: the launch configuration '{name}' is used, but nothing sets it"
-            raise LaunchError(message)
-        return self.text(default)
+            raise LaunchError(message, help=f'give it a value: {name}:=…')
+        otherwise = None if default is None else self.text(default)
+        known = self._place.result.arguments.get(name)
+        if known is not None and otherwise is not None and known.default != otherwise:
+            self._remark(f"the argument '{name}' is {otherwise.text!r} here unless it is given")
+            if name not in self._place.given:
+                return otherwise
+        # Nothing declares it, but whoever launches the file can set it.
+        return self._place.declare(known or Argument(name, otherwise))
 
     def _variable(self, written: Any) -> Text:
         name = self.text(private(written, 'name')).text
@@ -199,6 +211,7 @@ class Resolver:
         try:
             return translate(source, result)
         except UnlikeError:
+            self._place.freeze(source)
             self._remark(f'{source.text} was resolved to {result}')
             return _constant(result)
 
@@ -300,10 +313,18 @@ def _constant(text: str) -> Text:
     return Text(tuple(part for part in parts if part))
 
 
+class _RclLoader(yaml.SafeLoader):
+    """Reads `1e-6` as a number, as ROS does."""
+
+
+_NUMBER = re.compile(r'[-+]?\d+[eE][-+]?\d+')
+_RclLoader.add_implicit_resolver('tag:yaml.org,2002:float', _NUMBER, list('-+0123456789'))
+
+
 def read_file(path: str) -> Any:
     """Return the data of a YAML file; `None` if it has none."""
     try:
-        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        return yaml.load(Path(path).read_text(encoding='utf-8'), _RclLoader)  # noqa: S506
     except (OSError, ValueError, yaml.YAMLError):
         return None
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from composer.launch_files.texts import Text, chosen, marked, one
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 
@@ -23,6 +23,19 @@ class Condition:
     """
 
     code: str
+    holds: bool
+
+
+@dataclass
+class Setting:
+    """What a group gives to all nodes in it: a remapping rule, a parameter or a parameter file.
+
+    Attributes:
+        codes: The conditions that it was set under, as expressions.
+    """
+
+    value: Any
+    codes: tuple[str, ...]
     holds: bool
 
 
@@ -51,14 +64,23 @@ class Scope:
     waits: list[Wait] = field(default_factory=list)
     delay: Text | None = None
     file: Path | None = None
-    _configuration_stack: list[dict[str, Any]] = field(default_factory=list)
-    _environment_stack: list[dict[str, Text | None]] = field(default_factory=list)
+    # With how many conditions held when the scope began.
+    configuration_stack: list[tuple[int, dict[str, Any]]] = field(default_factory=list)
+    environment_stack: list[tuple[int, dict[str, Text | None]]] = field(default_factory=list)
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """The conditions of entries, as expressions; none if they always exist."""
+        return tuple(dict.fromkeys(each.code for each in self.conditions if each.code))
 
     @property
     def when(self) -> str:
         """An expression for whether entries exist; empty if they always do."""
-        codes = dict.fromkeys(each.code for each in self.conditions if each.code)
-        return ' and '.join(f'({code})' if len(codes) > 1 else code for code in codes)
+        return _all_of(self.codes)
+
+    def besides(self, setting: Setting) -> str:
+        """Return the conditions of a setting that do not hold here already."""
+        return _all_of([code for code in setting.codes if code not in self.codes])
 
     @property
     def holds(self) -> bool:
@@ -68,33 +90,40 @@ class Scope:
     def set(self, name: str, value: Text) -> None:
         """Set a configuration; where a condition decides, to what it was or to the new one."""
         before = self.configurations.get(name)
-        if self.when and isinstance(before, Text):
-            value = chosen(self.when, value, before, is_true=self.holds)
+        when = self._within(self.configuration_stack)
+        if when and isinstance(before, Text):
+            value = chosen(when, value, before, is_true=self.holds)
         self.configurations[name] = value
+
+    def _within(self, stack: list[tuple[int, Any]]) -> str:
+        """Return the conditions that began within the scope: it ends before they do."""
+        first = stack[-1][0] if stack else 0
+        return _all_of(dict.fromkeys(each.code for each in self.conditions[first:] if each.code))
 
     def set_variable(self, name: str, value: Text | None) -> None:
         """Set or unset an environment variable."""
         before = self.environment.get(name)
-        if self.when and value is not None:
-            outer = one(f"env('{name}', '')", '') if before is None else before
-            value = chosen(self.when, value, outer, is_true=self.holds)
+        when = self._within(self.environment_stack)
+        if when and value is not None:
+            outer = one('none', '') if before is None else before
+            value = chosen(when, value, outer, is_true=self.holds)
         self.environment[name] = value
 
     def push_configurations(self) -> None:
         """Begin a scope: what is set in it is forgotten at its end."""
-        self._configuration_stack.append(dict(self.configurations))
+        self.configuration_stack.append((len(self.conditions), dict(self.configurations)))
 
     def pop_configurations(self) -> None:
         """End a scope."""
-        self.configurations = self._configuration_stack.pop()
+        self.configurations = self.configuration_stack.pop()[1]
 
     def push_environment(self) -> None:
         """Begin a scope of environment variables."""
-        self._environment_stack.append(dict(self.environment))
+        self.environment_stack.append((len(self.conditions), dict(self.environment)))
 
     def pop_environment(self) -> None:
         """End a scope of environment variables."""
-        self.environment = self._environment_stack.pop()
+        self.environment = self.environment_stack.pop()[1]
 
     @contextmanager
     def under(self, condition: Condition | None) -> Iterator[None]:
@@ -132,9 +161,14 @@ class Scope:
 def _plain(value: Any, *, is_marked: bool) -> Any:
     if isinstance(value, Text):
         return marked(value) if is_marked and not value.is_constant else value.text
+    values = [item.value for item in value if item.holds]
     return [
         tuple(each.text if isinstance(each, Text) else each for each in item)
         if isinstance(item, tuple)
         else item.text
-        for item in value
+        for item in values
     ]
+
+
+def _all_of(codes: Collection[str]) -> str:
+    return ' and '.join(f'({code})' if len(codes) > 1 else code for code in codes)

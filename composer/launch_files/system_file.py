@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
 from composer.launch_files.texts import Computed, Text
+from composer.terminal import escape
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
     from composer.launch_files.results import Argument, Entry, Imported
 
+_FIXED = 'What the launch file does depends on it: import again to change it.'
 _SECTIONS = ('processes', 'containers')
 _NAME = re.compile(r'[^A-Za-z0-9_.-]+')
 
@@ -36,8 +38,14 @@ def render_system(
         folder: Where it is to stand: paths below that are written as `{{ here }}/…`.
     """
     written = SystemFile()
-    lines = [f'# Imported from {source}.', 'version: 1']
-    lines += _arguments(imported.arguments.values())
+    lines = [f'# Imported from {_one_line(source)}.', 'version: 1']
+    fixed = [each for each in imported.arguments.values() if each.is_fixed_expression]
+    lines += _arguments([each for each in imported.arguments.values() if each not in fixed])
+    for index, each in enumerate(fixed):
+        # The name of a variable is that of no argument.
+        lines += ['', 'vars:'] if index == 0 else []
+        value = render_yaml({each.name: each.default.written() if each.default else ''})
+        lines += [f'  # {_FIXED}', *(f'  {line}' for line in value.splitlines())]
     common = _common_environment(imported.entries)
     if common:
         lines += ['', render_yaml({'environment': common}).rstrip()]
@@ -47,15 +55,20 @@ def render_system(
             lines += ['', f'{section}:']
         for entry in entries:
             data = _from_here(_finished(imported, entry, common, written, stem), folder)
-            lines += [f'  # {entry.origin}'] if entry.origin else []
+            lines += [f'  # {_one_line(entry.origin)}'] if entry.origin else []
             lines += [f'  {line}' for line in render_yaml({entry.name: data}).splitlines()]
     if not imported.entries:
         lines += ['', 'nodes: {}']
     if imported.remarks:
         lines += ['', '# Not kept as it was:']
-        lines += [f'# {" ".join(remark.split())}' for remark in imported.remarks]
+        lines += [f'# {_one_line(remark)}' for remark in imported.remarks]
     written.text = '\n'.join(lines) + '\n'
     return written
+
+
+def _one_line(text: str) -> str:
+    """Return a text for a comment, without the characters that YAML does not allow."""
+    return escape(' '.join(text.split()))
 
 
 def _arguments(arguments: Any) -> list[str]:
@@ -64,9 +77,7 @@ def _arguments(arguments: Any) -> list[str]:
     lines = ['', 'args:']
     for argument in arguments:
         if argument.fixed:
-            lines.append(
-                '  # A function of the launch file depends on it: import again to change.'
-            )
+            lines.append(f'  # {_FIXED}')
         data = render_yaml({argument.name: _declaration(argument)})
         lines += [f'  {line}' for line in data.splitlines()]
     return lines
@@ -74,17 +85,12 @@ def _arguments(arguments: Any) -> list[str]:
 
 def _declaration(argument: Argument) -> dict[str, Any]:
     data: dict[str, Any] = {'type': 'string'}
-    default: Any = None
-    if argument.given is not None:
-        default = argument.given
-    elif argument.default is not None:
-        default = argument.default.written()
-    if default is not None:
-        data['default'] = default
+    if argument.default is not None:
+        data['default'] = argument.given if argument.fixed else argument.default.written()
     if argument.description:
         data['description'] = ' '.join(argument.description.split())
-    if argument.fixed and default is not None and not isinstance(default, Computed):
-        data['choices'] = [default]
+    if argument.fixed:
+        data['choices'] = [argument.given]
     elif argument.choices:
         data['choices'] = list(argument.choices)
     return data

@@ -313,3 +313,45 @@ def test_what_is_left_out_of_a_node_of_an_include_is_left_out(tmp_path):
         ['image', 'marked'],
         ['image'],
     ]
+
+
+def test_what_is_left_out_is_not_checked_for_what_its_values_would_be():
+    text = """
+args: {container: ''}
+containers:
+  own: {name: own, when: "{{ container == '' }}", components: {}}
+  other:
+    when: "{{ container != '' }}"
+    name: "{{ container }}"
+    components: {x: {package: a, plugin: 'b::C', remap: {a: "{{ container }}"}}}
+  "/{{ container }}": {when: "{{ container != '' }}", components: {}}
+"""
+    for words in ([], ['container:=all']):
+        assert messages(load(text, words)) == []
+    wrong = text.replace('remap:', 'remaps:')
+    assert [rule for rule, _ in messages(load(wrong, []))] == ['unknown-key']
+
+
+def test_an_expression_without_a_value_leaves_out_what_it_stands_for():
+    text = """
+args: {simulated: false, file: ''}
+processes:
+  p:
+    command: [echo, "{{ file if file else none }}", end]
+    name: p
+    env: {A: "{{ 'x' if simulated else none }}"}
+    remap: {a: "{{ 'b' if simulated else none }}"}
+    parameters: {use_sim_time: "{{ true if simulated else none }}"}
+    lifecycle: "{{ 'active' if simulated else none }}"
+    on_exit: "{{ 'shutdown' if simulated else none }}"
+environment: {B: "{{ 'x' if simulated else none }}"}
+"""
+    system = load(text, [])
+    process = system.spec.processes['p']
+    assert (messages(system), process.command) == ([], ('echo', 'end'))
+    assert not any((process.env, process.remap, process.parameters, process.lifecycle))
+    assert system.spec.environment == {}
+    process = load(text, ['simulated:=true', 'file:=x']).spec.processes['p']
+    assert process.command == ('echo', 'x', 'end')
+    assert (process.env, process.remap) == ({'A': 'x'}, (('a', 'b'),))
+    assert process.parameters == {'use_sim_time': True}

@@ -133,7 +133,6 @@ def test_a_file_without_arguments_says_so():
         ('a: {default: 4, choices: [1, 2]}', ('bad-argument-declaration', '2:21')),
         ('a: {choices: [1, two], type: integer}', ('bad-argument-declaration', '2:25')),
         ('a: {choices: ["{{ b }}"]}', ('bad-argument-declaration', '2:22')),
-        ('args: 1', ('bad-argument-declaration', '2:8')),
         ('a..b: 1', ('bad-argument-declaration', '2:8')),
         ('my name: 1', ('bad-argument-declaration', '2:8')),
         ('true_: 1, "true": 2', ('bad-argument-declaration', '2:18')),
@@ -155,3 +154,15 @@ def test_a_block_that_is_no_mapping_of_names_is_said(block):
     loaded = load_system_text(f'version: 1\n{block}\nnodes: {{}}\n', words=[])
     assert len(loaded.diagnostics) == 1
     assert loaded.diagnostics[0].span.line == 2
+
+
+@pytest.mark.parametrize('name', ['args', 'input/cloud', 'a.b-c/d'])
+def test_expressions_read_any_name_from_args(name):
+    text = f"""version: 1
+args: {{'{name}': {{default: x}}, other: "{{{{ args['{name}'] }}}}_y"}}
+processes: {{p: {{command: [echo, "{{{{ args['{name}'] }}}}", "{{{{ other }}}}"]}}}}
+"""
+    for words, expected in (([], 'x'), ([f'{name}:=z'], 'z')):
+        system = load_system_text(text, words=words)
+        assert not system.diagnostics
+        assert system.spec.processes['p'].command == ('echo', expected, f'{expected}_y')

@@ -15,8 +15,8 @@ class TextSubstitution(Substitution):
 
 
 class LaunchConfiguration(Substitution):
-    def __init__(self, name):
-        self.variable_name, self.default = [TextSubstitution(name)], None
+    def __init__(self, name, default=None):
+        self.variable_name, self.default = [TextSubstitution(name)], default
 
     def perform(self, context):
         return context.launch_configurations[self.variable_name[0].text]
@@ -97,20 +97,20 @@ class PushRosNamespace(Entity):
 
 
 class SetRemap(Entity):
-    def __init__(self, src, dst):
-        super().__init__()
+    def __init__(self, src, dst, condition=None):
+        super().__init__(condition)
         self.src, self.dst = src, dst
 
 
 class SetParameter(Entity):
-    def __init__(self, param_dict):
-        super().__init__()
+    def __init__(self, param_dict, condition=None):
+        super().__init__(condition)
         self.param_dict = param_dict
 
 
 class SetEnvironmentVariable(Entity):
-    def __init__(self, name, value):
-        super().__init__()
+    def __init__(self, name, value, condition=None):
+        super().__init__(condition)
         self.name, self.value = name, value
 
 
@@ -164,7 +164,10 @@ class ExecuteLocal(Entity):
         self.on_exit = keys.get('on_exit')
         self.sigterm_timeout = self.sigkill_timeout = '5'
         self.process_description = SimpleNamespace(
-            env=None, additional_env=keys.get('additional_env'), cwd=keys.get('cwd')
+            env=None,
+            additional_env=keys.get('additional_env'),
+            cwd=keys.get('cwd'),
+            prefix=keys.get('prefix'),
         )
 
 

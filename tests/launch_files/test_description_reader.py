@@ -3,6 +3,7 @@
 import pytest
 import yaml
 
+from composer.errors import UsageError
 from composer.language.pipeline import load_system
 from composer.launch_files.description_reader import DescriptionReader
 from composer.launch_files.place import Place
@@ -135,7 +136,7 @@ def test_arguments_remain_arguments(tmp_path):
             'description': 'Which one.',
             'choices': ['left', 'right'],
         },
-        'sim': {'type': 'string', 'default': 'true'},
+        'sim': {'type': 'string', 'default': 'false'},
     }
     (process,) = resolved(tmp_path, system, 'side:=right').values()
     assert process.arguments == ('right',)
@@ -191,6 +192,96 @@ def test_values_after_a_file_that_has_them_too_are_in_a_file_of_their_own(tmp_pa
     assert yaml.safe_load(system.files['x.params/a.yaml']) == {
         '/**/a': {'ros__parameters': {'y': 2, 'z': 3}}
     }
+
+
+@pytest.mark.parametrize('is_scoped', [False, True], ids=['plain', 'in a group'])
+def test_what_a_condition_sets_is_set_when_it_holds(tmp_path, is_scoped):
+    holds, fails = launch.IfCondition(SIM), launch.UnlessCondition(SIM)
+    settings = [
+        launch.SetParameter({'use_sim_time': True, 'x': 1}, holds),
+        launch.SetParameter({'use_sim_time': False}, fails),
+        launch.SetRemap('a', 'b', holds),
+        launch.SetRemap('d', 'e', holds),
+        launch.SetEnvironmentVariable('LEVEL', '3', holds),
+    ]
+    parts = [*settings, node(name='n', remappings=[('a', 'c')])]
+    for given in ('true', 'false'):
+        system = read(*([launch.GroupAction(parts)] if is_scoped else parts), sim=given)
+        (on,) = resolved(tmp_path, system, 'sim:=true').values()
+        (off,) = resolved(tmp_path, system, 'sim:=false').values()
+        assert (dict(on.parameters), dict(off.parameters)) == (
+            {'use_sim_time': True, 'x': 1},
+            {'use_sim_time': False},
+        )
+        assert (dict(on.remap), dict(off.remap)) == (
+            {'a': 'b', 'd': 'e'},
+            {'a': 'c', 'd': 'd'},
+        )
+        assert yaml.safe_load(system.text)['environment'] == {
+            'LEVEL': "{{ ('3' if sim | bool else none) }}"
+        }
+
+
+def test_what_holds_wherever_it_is_used_has_no_condition(tmp_path):
+    group = launch.GroupAction(
+        [launch.SetRemap('a', 'b'), launch.SetParameter({'x': 1}), node(name='n')],
+        condition=launch.IfCondition(SIM),
+    )
+    (process,) = yaml.safe_load(read(group).text)['processes'].values()
+    assert (process['remap'], process['parameters']) == ({'a': 'b'}, {'x': 1})
+
+
+@pytest.mark.parametrize('name', ['args', 'input/cloud', 'depth.profile', 'find', 'in-out'])
+def test_any_name_of_an_argument_is_kept(tmp_path, name):
+    argument = launch.DeclareLaunchArgument(name, 'as it was')
+    system = read(argument, node(arguments=[launch.LaunchConfiguration(name)]))
+    for words, expected in (([], 'as it was'), ([f'{name}:=new'], 'new')):
+        (process,) = resolved(tmp_path, system, *words).values()
+        assert process.arguments == (expected,)
+
+
+def test_what_is_required_stays_so(tmp_path):
+    port, model = (
+        launch.DeclareLaunchArgument('port'),
+        launch.DeclareLaunchArgument('model', choices=('a', 'b')),
+    )
+    system = read(port, model, node(), port='/dev/x')
+    args = yaml.safe_load(system.text)['args']
+    assert (args['port'], args['model']) == (
+        {'type': 'string'},
+        {'type': 'string', 'choices': ['a', 'b']},
+    )
+    with pytest.raises(UsageError, match="'port' is missing; 'model' is missing"):
+        resolved(tmp_path, system, 'sim:=true')
+
+
+def test_a_configuration_that_nothing_declares_is_an_argument(tmp_path):
+    frame = launch.LaunchConfiguration('frame', [SIDE, '_base'])
+    system = read(node(arguments=[frame]))
+    for words, expected in ((['side:=right'], 'right_base'), (['frame:=map'], 'map')):
+        (process,) = resolved(tmp_path, system, *words).values()
+        assert process.arguments == (expected,)
+
+
+def test_what_depends_on_a_resolved_condition_cannot_change():
+    class Odd:
+        def evaluate(self, context):
+            return context.launch_configurations['sim'] == 'false'
+
+    system = read(node(condition=Odd()))
+    assert yaml.safe_load(system.text)['args']['sim']['choices'] == ['false']
+
+
+@pytest.mark.parametrize(
+    'prefix', ["bash -c 'sleep 2.5; $0 $@'", """/bin/sh -c 'sleep 2.5 && exec "$0" "$@"'"""]
+)
+def test_a_prefix_that_sleeps_is_a_delay(prefix):
+    (process,) = yaml.safe_load(read(node(prefix=prefix)).text)['processes'].values()
+    assert process['delay'] == 2.5
+
+
+def test_comments_have_only_what_yaml_allows(tmp_path):
+    resolved(tmp_path, read(launch.LogInfo(['\x1b[31mred\x00']), node()))
 
 
 def test_an_argument_without_a_value_is_asked_for():

@@ -86,7 +86,8 @@ def takes_format(
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Split the words of the current command into files and the arguments that follow them.
 
-    The first word is a file, and so are the words right after it that end in `.yaml` or `.yml`.
+    The first word is a file, and so are the words right after it that end in `.yaml` or `.yml`;
+    `name:=value` is always an argument.
 
     Raises:
         click.UsageError: There is no file, or an unknown option.
@@ -99,9 +100,13 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     if os.path.isdir(words[0]):  # noqa: PTH112 - pathlib's raises
         raise _folder_error(words[0])
     count = 1
-    while count < len(words) and words[count].endswith(('.yaml', '.yml')):
+    while count < len(words) and _is_layer(words[count]):
         count += 1
     return [Path(word) for word in words[:count]], list(words[count:])
+
+
+def _is_layer(word: str) -> bool:
+    return word.endswith(('.yaml', '.yml')) and ':=' not in word
 
 
 def refuse_options(words: Sequence[str]) -> None:

@@ -8,16 +8,28 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.checks.checker import check_system
+from composer.diagnostics import errors_first
 from composer.errors import ComposerError, ExitCode, UsageError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_system
 from composer.launch_files.importing import import_file
 from composer.launch_files.system_file import render_system
+from composer.reports.text import render_finding
+from composer.rules import Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from composer.launch_files.system_file import SystemFile
 
-_ENDINGS = ('.py', '.xml', '.yaml', '.yml')
+_ENDINGS = ('.py', '.xml', '.yaml', '.yml', '.launch')
+_OF_INSTALLATION = (
+    'missing-package',
+    'uninstalled-package',
+    'unknown-executable',
+    'missing-launch-file',
+)
 
 
 def import_launch_file(
@@ -54,14 +66,36 @@ def import_launch_file(
         if system.files:
             names = ', '.join(system.files)
             click.echo(f'{names}: parameter files of the system; -o writes them, too', err=True)
-    if not verifies:
-        return ExitCode.DONE
-    from composer.cli.importing.verification import verify, without_components
+    arguments = imported.words(given)
+    with tempfile.TemporaryDirectory(prefix='composer-import-') as temporary:
+        checked = output or Path(temporary) / f'{stem}.yaml'
+        if output is None:
+            list(_write(system, checked))
+        is_refused = check_imported(checked, arguments)
+        if is_refused or not verifies:
+            return ExitCode.FAILED if is_refused else ExitCode.DONE
+        from composer.cli.importing.verification import verify, without_components
 
-    with tempfile.TemporaryDirectory(prefix='composer-import-') as folder:
-        copy = Path(folder) / f'{stem}.yaml'
+        copy = Path(temporary) / 'plain' / f'{stem}.yaml'
         list(_write(render_system(without_components(imported), path.name, stem), copy))
-        return verify(path, given, imported, copy)
+        return verify(path, arguments, imported, copy)
+
+
+def check_imported(path: Path, words: Sequence[str]) -> bool:
+    """Print the errors of a system that was written; return whether there are any."""
+    system = load_system(path, words)
+    found = errors_first(check_system(system, InterfaceCatalogue()))
+    # What is not installed here, `ros2 launch` does not find either.
+    errors = [
+        each
+        for each in found
+        if each.severity is Severity.ERROR and each.rule not in _OF_INSTALLATION
+    ]
+    for each in errors:
+        click.echo(f'{render_finding(each)}\n', err=True)
+    if errors:
+        click.echo('the system that was imported has errors', err=True)
+    return bool(errors)
 
 
 def _read_words(words: Sequence[str]) -> dict[str, str]:

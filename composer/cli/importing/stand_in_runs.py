@@ -7,11 +7,13 @@ with the names of the programs that end at once, separated by commas.
 from __future__ import annotations
 
 import importlib
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
 
 from composer.cli.main import run
+from composer.launch_files.launched_programs import SLEEP
 from composer.launch_files.verification import stand_in
 from composer.processes.process_commands import CommandWriter
 
@@ -44,9 +46,12 @@ def run_launch(path: str, arguments: list[str], stand_ins: StandIns) -> int:
     execute = local.async_execute_process
 
     def execute_stand_in(*args: Any, cmd: Any, shell: bool = False, **keywords: Any) -> Any:
-        words = ['/bin/sh', '-c', cmd if isinstance(cmd, str) else ' '.join(cmd)] if shell else cmd
+        line = cmd if isinstance(cmd, str) else ' '.join(cmd)
+        words = ['/bin/sh', '-c', line] if shell else list(cmd)
         keywords['emulate_tty'] = False
-        return execute(*args, cmd=stand_ins.command(list(words)), shell=False, **keywords)
+        # A prefix that only waits is a delay of the system.
+        words = words[3:] if SLEEP.fullmatch(shlex.join(words[:3])) else words
+        return execute(*args, cmd=stand_ins.command(words), shell=False, **keywords)
 
     vars(local)['async_execute_process'] = execute_stand_in
     service = launch.LaunchService(argv=arguments, noninteractive=True)

@@ -21,13 +21,14 @@ import click
 
 from composer.ament import PACKAGE_INDEX, find_share, list_executables
 from composer.errors import ExitCode
+from composer.language.pipeline import load_system
 from composer.launch_files.texts import Computed
 from composer.launch_files.verification.comparison import pair
 from composer.launch_files.verification.given import read_given
 from composer.terminal import escape_output
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Sequence
 
     from composer.launch_files.results import Entry, Imported
     from composer.launch_files.verification.given import Given
@@ -37,22 +38,62 @@ _QUIET_SEC = 2.0
 _LONGEST_SEC = 90.0
 _POLL_SEC = 0.1
 _END_SEC = 20.0
+# Each is a run of both.
+_MOST_CHANGES = 12
+_MOST_CHOICES = 3
+_OPPOSITES = {'true': 'false', 'false': 'true'}
 _FOUND = re.compile(r"find\('(\w+)'\)")
 
 
-def verify(launch_file: Path, given: Mapping[str, str], imported: Imported, system: Path) -> int:
+def verify(launch_file: Path, words: Sequence[str], imported: Imported, system: Path) -> int:
     """Run both with stand-ins, and print how they differ; return the exit code.
 
+    They are run with the arguments of the import, and again with other values of arguments that
+    have choices or are true or false, one at a time.
+
     Args:
-        given: The arguments of both.
+        words: The arguments of both.
         system: The file with the system, without components.
     """
     with tempfile.TemporaryDirectory(prefix='composer-verify-') as text:
-        folder = Path(text)
-        site = _Site(folder / 'prefix', imported, system.read_text(encoding='utf-8'))
-        launched = _run('launch', launch_file.absolute(), given, folder, site)
-        composed = _run('system', system.absolute(), {}, folder, site)
-    return _report(launched, composed, imported, site.expected)
+        site = _Site(Path(text) / 'prefix', imported, system.parent)
+        same = _compare(launch_file, words, system, Path(text) / 'as_imported', site)
+        for number, change in enumerate(other_values(imported)):
+            click.echo(f'with {change}:')
+            name = change.partition(':=')[0]
+            others = [each for each in words if each.partition(':=')[0] != name]
+            folder = Path(text) / str(number)
+            same &= _compare(launch_file, [*others, change], system, folder, site)
+    for entry in imported.entries:
+        _say_what_is_left_out(entry)
+    return ExitCode.DONE if same else ExitCode.FAILED
+
+
+def other_values(imported: Imported) -> list[str]:
+    """Return other values of arguments, each as on a command line."""
+    changes = []
+    for name, argument in imported.arguments.items():
+        others = [each for each in argument.choices if each != argument.given]
+        if not argument.choices and argument.given.lower() in _OPPOSITES:
+            other = _OPPOSITES[argument.given.lower()]
+            others = [other.title() if argument.given.istitle() else other]
+        changes += [] if argument.fixed else [f'{name}:={each}' for each in others[:_MOST_CHOICES]]
+    return changes[:_MOST_CHANGES]
+
+
+def _compare(
+    launch_file: Path, words: Sequence[str], system: Path, folder: Path, site: _Site
+) -> bool:
+    """Run both with these arguments, and print how they differ; return whether they do not."""
+    spec = load_system(system, words).spec
+    expected = len(spec.processes) if spec else 0
+    folder.mkdir()
+    runs = [
+        _Run('launch', launch_file.absolute(), words, folder, site),
+        _Run('system', system.absolute(), words, folder, site),
+    ]
+    launched, composed = [run.finished(expected) for run in runs]
+    return _report(launched, composed, expected)
 
 
 def without_components(imported: Imported) -> Imported:
@@ -74,15 +115,16 @@ class _Site:
 
     Args:
         prefix: A prefix of its own, to be filled.
-        text: The system.
+        folder: That of the system.
     """
 
-    def __init__(self, prefix: Path, imported: Imported, text: str) -> None:
-        entries = [entry for entry in imported.entries if entry.holds]
+    def __init__(self, prefix: Path, imported: Imported, folder: Path) -> None:
+        entries = imported.entries
+        files = [each for each in folder.rglob('*') if each.is_file()]
+        text = ''.join(each.read_text(encoding='utf-8', errors='replace') for each in files)
         self._prefix = prefix
         self.replaced: dict[str, str] = {}
         self.ends = ','.join(_names_that_end(imported))
-        self.expected = sum(each.action is not None for each in entries)
         self.delay_sec = max((_now(each.data.get('delay', 0.0)) for each in entries), default=0.0)
         bin_folder = prefix / 'bin'
         bin_folder.mkdir(parents=True)
@@ -102,6 +144,7 @@ class _Site:
             'AMENT_PREFIX_PATH': os.pathsep.join(filter(None, prefixes)),
             'PATH': f'{os.environ.get("PATH", os.defpath)}{os.pathsep}{bin_folder}',
             # Nobody else is to meet the two.
+            'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         }
 
@@ -149,24 +192,36 @@ def _now(value: Any) -> Any:
     return value.value if isinstance(value, Computed) else value
 
 
-def _run(
-    kind: str, path: Path, given: Mapping[str, str], folder: Path, site: _Site
-) -> list[Given]:
-    """Return what the stand-ins of a run were given."""
-    written = folder / kind
-    written.mkdir()
-    words = [f'{name}:={value}' for name, value in given.items()]
-    module = 'composer.cli.importing.stand_in_runs'
-    with (folder / f'{kind}.log').open('w+', encoding='utf-8') as log:
-        process = subprocess.Popen(  # noqa: S603 - Composer itself
-            [sys.executable, '-m', module, kind, str(written), site.ends, str(path), *words],
+class _Run:
+    """A launch file or a system that runs with stand-ins.
+
+    Args:
+        kind: `launch` or `system`.
+        words: The arguments.
+        folder: Where its stand-ins write.
+    """
+
+    def __init__(
+        self, kind: str, path: Path, words: Sequence[str], folder: Path, site: _Site
+    ) -> None:
+        self._kind, self._site = kind, site
+        self._written = folder / kind
+        self._written.mkdir()
+        self._log = (folder / f'{kind}.log').open('w+', encoding='utf-8')
+        module = 'composer.cli.importing.stand_in_runs'
+        self._process = subprocess.Popen(  # noqa: S603 - Composer itself
+            [sys.executable, '-m', module, kind, str(self._written), site.ends, str(path), *words],
             env=site.environment,
             stdin=subprocess.DEVNULL,
-            stdout=log,
+            stdout=self._log,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-        _wait(process, written, site)
+
+    def finished(self, expected: int) -> list[Given]:
+        """End it when all has begun, and return what the stand-ins were given."""
+        process = self._process
+        self._wait(expected)
         # `launch` leaves its processes behind at SIGTERM.
         process.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired):
@@ -174,35 +229,33 @@ def _run(
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        found = sorted(written.glob('*.json'), key=lambda each: int(each.stem))
-        if len(found) < site.expected:
-            log.seek(0)
-            click.echo(f'{kind}: {len(found)} of {site.expected} processes began', err=True)
-            click.echo(escape_output(log.read()[-2000:]), err=True)
-    texts = (each.read_text(encoding='utf-8') for each in found)
-    return [read_given(json.loads(text), site.replaced) for text in texts]
+        found = sorted(self._written.glob('*.json'), key=lambda each: int(each.stem))
+        with self._log as log:
+            if len(found) < expected:
+                log.seek(0)
+                click.echo(f'{self._kind}: {len(found)} of {expected} processes began', err=True)
+                click.echo(escape_output(log.read()[-2000:]), err=True)
+        texts = (each.read_text(encoding='utf-8') for each in found)
+        return [read_given(json.loads(text), self._site.replaced) for text in texts]
+
+    def _wait(self, expected: int) -> None:
+        """Wait until all that is expected has begun, and nothing more does."""
+        count, last = 0, time.monotonic()
+        until = last + _LONGEST_SEC + self._site.delay_sec
+        while self._process.poll() is None and time.monotonic() < until:
+            now = len(list(self._written.glob('*.json')))
+            if now != count:
+                count, last = now, time.monotonic()
+            quiet_sec = time.monotonic() - last
+            if count >= expected and quiet_sec > _QUIET_SEC:
+                return
+            if count and quiet_sec > _QUIET_SEC * 3 + self._site.delay_sec:
+                return
+            time.sleep(_POLL_SEC)
 
 
-def _wait(process: subprocess.Popen[bytes], written: Path, site: _Site) -> None:
-    """Wait until all that is expected has begun, and nothing more does."""
-    count, last = 0, time.monotonic()
-    until = last + _LONGEST_SEC + site.delay_sec
-    while process.poll() is None and time.monotonic() < until:
-        now = len(list(written.glob('*.json')))
-        if now != count:
-            count, last = now, time.monotonic()
-        quiet_sec = time.monotonic() - last
-        if count >= site.expected and quiet_sec > _QUIET_SEC:
-            return
-        if count and quiet_sec > _QUIET_SEC * 3 + site.delay_sec:
-            return
-        time.sleep(_POLL_SEC)
-
-
-def _report(
-    launched: list[Given], composed: list[Given], imported: Imported, expected: int
-) -> int:
-    """Print the differences; return the exit code."""
+def _report(launched: list[Given], composed: list[Given], expected: int) -> bool:
+    """Print the differences; return whether there are none."""
     pairs = pair(launched, composed)
     for each in pairs:
         click.echo(f'{each.label}: {"the same" if each.is_same else "differs"}')
@@ -210,10 +263,7 @@ def _report(
             click.echo(f'  {line}')
     counts = Counter(each.is_same for each in pairs)
     click.echo(f'{counts[True]} of {max(len(pairs), expected)} are given the same', err=True)
-    for entry in imported.entries:
-        _say_what_is_left_out(entry)
-    is_whole = min(len(launched), len(composed)) >= expected
-    return ExitCode.DONE if is_whole and not counts[False] else ExitCode.FAILED
+    return min(len(launched), len(composed)) >= expected and not counts[False]
 
 
 def _say_what_is_left_out(entry: Entry) -> None:

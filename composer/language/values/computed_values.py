@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, Span, diagnostic_at
 from composer.errors import StartError
-from composer.expressions import ARGUMENTS
+from composer.expressions import ALL_ARGUMENTS, ARGUMENTS
 from composer.expressions.scope import Scope
 from composer.expressions.templates import TemplateEvaluator
 from composer.language.arguments import StartDefault, find_declaration_errors, find_value_problem
@@ -127,7 +127,7 @@ class _Computation:
         needs: dict[str, list[str]] = {}
         for name, data in self._pending.items():
             names = self._evaluator.names_in(data)
-            used = {*names, *self._declared} if ARGUMENTS in names else names
+            used = {*names, *self._declared} if ALL_ARGUMENTS in names else names
             needs[name] = sorted(used & self._pending.keys())
         while True:
             try:

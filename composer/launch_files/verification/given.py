@@ -21,6 +21,9 @@ _NOT_COMPARED = re.compile(
     r'PYTHONUNBUFFERED|PWD|OLDPWD|SHLVL|_|LC_CTYPE|PATH|NOTIFY_SOCKET|COMPOSER_\w+'
 )
 
+# Files that launch code writes at each start, and anonymous names.
+_RANDOM = re.compile(r'(?<=/)(launch_params_|tmp)[a-z0-9_]{8}\b|(?<=_)\d+_\d{6,}\b')
+
 
 class _Loader(yaml.SafeLoader):
     """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
@@ -105,6 +108,8 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
             given.others.append(f'{word} {next(words, ("", ""))[0]}')
         else:
             given.others.append(word)
+    # A rule for a name itself only keeps those after it from it.
+    given.remaps = {old: new for old, new in given.remaps.items() if old != new}
     given.parameters = _merged(sources, given)
     given.environment = {
         key: _replace(value, replaced)
@@ -121,8 +126,8 @@ def _add_remap(given: Given, rule: str) -> None:
         given.name = given.name or new
     elif old == '__ns':
         given.namespace = expand_namespace(new)
-    else:
-        given.remaps.setdefault(old, new)
+    elif old not in given.remaps:
+        given.remaps[old] = new
 
 
 def _load(text: str, replaced: Mapping[str, str]) -> Any:
@@ -171,4 +176,4 @@ def _flat(data: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 def _replace(text: str, replaced: Mapping[str, str]) -> str:
     for old, new in replaced.items():
         text = text.replace(old, new)
-    return text
+    return _RANDOM.sub('…', text)

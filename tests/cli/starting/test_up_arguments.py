@@ -157,3 +157,19 @@ def test_standard_input_cannot_be_watched(run):
         '',
         'error: --watch cannot watch standard input, which is read once\n  help: give a file\n',
     )
+
+
+@pytest.mark.parametrize('command', ['check', 'show', 'graph', 'plan', 'export systemd'])
+@pytest.mark.parametrize('value', ['/tmp/m.yaml', 'm.yml', 'x.scenario.yaml'])
+def test_a_word_with_a_name_is_an_argument_even_if_it_ends_like_a_file(
+    run, tmp_path, command, value
+):
+    file = tmp_path / 'x.yaml'
+    file.write_text(
+        "version: 1\nargs: {map: ''}\nprocesses: {p: {command: [echo, '{{ map }}']}}\n"
+    )
+    files = [str(file)] * (2 if command == 'plan' else 1)
+    code, out, err = run(*command.split(), *files, f'map:={value}')
+    assert code == 0, out + err
+    if command == 'show':
+        assert value in out
