@@ -924,3 +924,10 @@ def packages_of_interfaces(folder):
     fields = ''.join(f'int32 a{index}\n' for index in range(600))
     for index in range(30):
         write(folder, fields, f'odd/msg/M{index}.msg')
+
+
+@case('bad-nodl')
+def nested_nodl(folder):
+    nodl = '<interface version="1"><node name="n" executable="e">' + '<x>' * (2_000_000 // DIVISOR)
+    write(folder, nodl, 'n.nodl.xml')
+    write(folder, f'{HEAD}processes: {{p: {{command: [sh], nodl: n.nodl.xml}}}}\n')

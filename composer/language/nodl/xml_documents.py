@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from xml.parsers import expat  # no entities: a document that declares any is refused
 
 from composer.diagnostics import Span, diagnostic_at
+from composer.input_limits import MAX_FINDINGS
 from composer.language.nodl.node_builder import RULE, NodlNode
 from composer.spelling import suggest
 
@@ -81,6 +82,8 @@ class _Reader:
         raise _RefusedError
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        if len(self.findings) >= MAX_FINDINGS:
+            raise _RefusedError
         here = self._here(len(tag) + 1)
         parent = self._open[-1] if self._open else None
         self._open.append(tag)
