@@ -343,3 +343,10 @@ def test_a_record_is_kept_where_its_data_are_the_same(tmp_path, old, new, is_kep
     after, alone = load_system(path, before=before), load_system(path)
     assert (after.spec.nodes['rover'] is before.spec.nodes['rover']) is is_kept
     assert repr(after.spec) == repr(alone.spec)
+
+
+@pytest.mark.parametrize('name', ['..yaml', '...yaml'])
+def test_a_file_of_dots_alone_names_no_folder(tmp_path, name):
+    (tmp_path / name).write_text('version: 1\nnodes: {}\n')
+
+    assert load_system(tmp_path / name).spec.name == 'system'

@@ -58,7 +58,9 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
     Args:
         before: A system whose nodes and processes are kept where the data are the same.
     """
-    name, used = system.path.stem, dict(system.entries)
+    # Files and folders are named after it: '.' and '..' would be others.
+    name = system.path.stem if system.path.stem.strip('.') else 'system'
+    used = dict(system.entries)
     if system.left_out:
         unused = dict(used)
         for section in PARTS:
