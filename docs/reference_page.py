@@ -155,7 +155,7 @@ def _table(owner: dict[str, Any], schema: dict[str, Any]) -> Iterator[str]:
 def _conditions(owner: dict[str, Any]) -> Iterator[str]:
     for word, keyword in (('Exactly one', 'oneOf'), ('At least one', 'anyOf')):
         branches = owner.get(keyword, ())
-        if branches and all(set(branch) == {'required'} for branch in branches):
+        if branches and all('required' in each and 'type' not in each for each in branches):
             listed = _join(
                 ' with '.join(f'`{key}`' for key in branch['required']) for branch in branches
             )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 Check: TypeAlias = Callable[[Any], bool]
 Schema: TypeAlias = dict[str, Any]
@@ -39,12 +39,14 @@ class SchemaCompiler:
             self._compiled[name] = self.compile(self._definitions[name])
         return self._compiled[name]
 
-    def compile(self, schema: Schema) -> Check:
+    def compile(self, schema: Schema | Literal[False]) -> Check:
         """Return the check for a schema.
 
         Raises:
             ValueError: It has a keyword that the schema of the language does not use.
         """
+        if isinstance(schema, bool):
+            return lambda _: False
         compilers = dict.fromkeys(
             compiler for keyword, compiler in _COMPILERS.items() if keyword in schema
         )

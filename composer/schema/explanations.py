@@ -217,7 +217,7 @@ def _explain_exclusion(error: ValidationError) -> Iterator[Violation]:
 
 def _explain_alternatives(error: ValidationError) -> Iterator[Violation]:
     branches = error.validator_value
-    if all(set(branch) == {'required'} for branch in branches):
+    if all('required' in branch and 'type' not in branch for branch in branches):
         if not isinstance(error.instance, dict):
             return  # its type has a finding of its own
         yield _explain_key_alternatives(error, [branch['required'] for branch in branches])

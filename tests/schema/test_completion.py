@@ -29,3 +29,10 @@ def test_examples_are_what_editors_can_show(name):
 def test_every_qos_profile_of_ros_is_offered():
     schema = json.loads(schema_path().read_text())
     assert schema['$defs']['qos_profile_name']['examples'] == [*BUILTIN_PROFILES]
+
+
+def test_an_editor_names_the_key_that_is_too_much():
+    """The YAML language server says of `oneOf` alone that several schemas match."""
+    schema = json.loads(schema_path().read_text())
+    forms = schema['$defs']['timer']['oneOf']
+    assert [form['properties'] for form in forms] == [{'rate': False}, {'period': False}]

@@ -43,7 +43,9 @@ def values(schema):
         name = schema['$ref'].rpartition('/')[2]
         return st.deferred(lambda: values(PLAIN['$defs'][name]))
     for key in ('oneOf', 'anyOf'):
-        branches = [each for each in schema.get(key, ()) if set(each) != {'required'}]
+        branches = [
+            each for each in schema.get(key, ()) if each.keys() - {'required', 'properties'}
+        ]
         if branches:
             return st.one_of(*map(values, branches))
     if 'enum' in schema:
