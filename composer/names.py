@@ -106,6 +106,12 @@ def join_names(namespace: str, name: str) -> str:
     return f'/{name}' if namespace == '/' else f'{namespace}/{name}'
 
 
+def split_name(full_name: str) -> tuple[str, str]:
+    """Return the namespace and the name of a full name."""
+    namespace, _, name = full_name.rpartition('/')
+    return namespace or '/', name
+
+
 def expand_name(name: str, node_name: str, namespace: str) -> str:
     """Return a topic, service or action name in full, as `rcl_expand_topic_name` does."""
     if '{' in name:

@@ -159,8 +159,8 @@ class ComposerExecutor(MultiThreadedExecutor):
 
         Args:
             entity: A subscription, which gets messages; a service, which gets objects with the
-                request as `message`, and `respond(response)`; or an action, which gets functions
-                that return what is awaited.
+                request as `message`, `respond(response)` and `fail(error)`; or an action, which
+                gets functions that return what is awaited.
             depth: How many it holds; `None` for any number.
         """
         return self._spinner.registry.open_inbox(node, entity, depth)
@@ -267,6 +267,9 @@ class ComposerExecutor(MultiThreadedExecutor):
     def report(self, error: BaseException) -> None:
         """Have `error` raised where the executor spins."""
         self._spinner.report(error)
+
+    def note_unanswered(self, service: Any, header: Any, error: BaseException) -> None:
+        """Note that a request over the middleware gets no response: its callback raised."""
 
     def halt(self) -> None:
         """Wait for running callbacks, as rclpy's pool does when the interpreter ends.

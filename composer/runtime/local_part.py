@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Protocol
 
 from composer.errors import ExitCode
@@ -34,13 +35,15 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import find_hidden
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from rclpy.context import Context
+    from rclpy.node import Node
 
     from composer.language.specs import SystemSpec
     from composer.planning.snapshot import Snapshot
     from composer.processes.guardian_client import GuardianClient, NoGuardian
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.control.control_services import AskedWorkers, Commands
     from composer.runtime.elsewhere import Elsewhere
     from composer.runtime.health.deliveries import Deliveries
@@ -50,6 +53,9 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
 
 _EXECUTOR_STOP_SEC = 1.0
+# How long a worker that is started again waits for the clients of others, of which some may go.
+_LONGEST_DISCOVERY_SEC = 10.0
+_POLL_SEC = 0.01
 
 
 class SystemRecorder(Protocol):
@@ -119,6 +125,7 @@ class LocalPart:
                 self._stop_request.fail, 'the ROS context was shut down, so the system ends'
             ),
             on_broken=self._on_broken,
+            on_unanswered=self.fail_request,
         )
         reserve(self._executor, 'the executor', 'shutdown')
         self._error_policy = ErrorPolicy(self.restart_node, self.shutdown)
@@ -134,7 +141,7 @@ class LocalPart:
         )
         self._graph_watcher = GraphWatcher(
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints],
-            lambda: next((node.ros for node in list(self._nodes.values())), self._control.ros),
+            lambda: self._any_ros,
             observers,
         )
 
@@ -173,8 +180,11 @@ class LocalPart:
             create_entity=create_entity,
         )
 
-    def create(self) -> None:
+    def create(self, clients: frozenset[bytes] = frozenset()) -> None:
         """Create all nodes and entities of this process; no behaviour is called yet.
+
+        Args:
+            clients: Those that the others know; see `list_clients`.
 
         Raises:
             StartError: One of them cannot be created.
@@ -184,6 +194,7 @@ class LocalPart:
             if self._recorder is not None:
                 self._recorder.start(self._context, self._handle.topics)
             self._create_nodes()
+        self._wait_for_clients(clients)
         self._executor.start()
         self._hang_watcher.start()
         self._graph_watcher.start()
@@ -197,6 +208,23 @@ class LocalPart:
         self._starter.create(self._reading.spec.nodes.values())
         for node in self._nodes.values():
             self._executor.add_node(node.ros)
+
+    def list_clients(self) -> frozenset[bytes]:
+        """Return the clients that this process knows; see `LostParticipants`."""
+        ros = self._any_ros
+        return self._handle.lost.list_clients(ros) if ros else frozenset()
+
+    def _wait_for_clients(self, clients: frozenset[bytes]) -> None:
+        """Wait until these are known: whoever is not would get no response."""
+        deadline = monotonic() + _LONGEST_DISCOVERY_SEC
+        while not (self.stop_requested or clients <= self.list_clients()):
+            if monotonic() > deadline:
+                return
+            sleep(_POLL_SEC)
+
+    @property
+    def _any_ros(self) -> Node | None:
+        return next((node.ros for node in list(self._nodes.values())), self._control.ros)
 
     def run_on_start(self) -> bool:
         """Start processes and nodes that wait for nothing; return whether others wait.
@@ -276,17 +304,22 @@ class LocalPart:
         """Return the full names of the nodes of this process that have not started."""
         return find_hidden(self._nodes)
 
-    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
-        """End the calls and goals that wait for servers of a process that has gone.
+    def fail_request(self, failure: RequestFailure) -> None:
+        """End the call that waits for the response to a request, in whichever process it is."""
+        for node in list(self._nodes.values()):
+            clients: dict[str, Any] = node.entities['service_clients']
+            if any(client.fail_request(failure) for client in list(clients.values())):
+                return
+
+    def lose_servers(self, participants: Iterable[bytes]) -> None:
+        """End the calls and goals that wait for servers of a process that was killed.
 
         Args:
-            lost: The names that nobody serves any more, by the section of their clients.
+            participants: See `LostParticipants`.
         """
+        self._handle.lost.add(participants)
         for node in list(self._nodes.values()):
-            for section, names in lost.items():
-                clients: dict[str, Any] = node.entities.get(section, {})
-                for client in list(clients.values()):
-                    client.lose_server(names)
+            node.lose_servers()
 
     def list_components(self) -> list[str]:
         """Return the full names of the components that are loaded into its containers."""

@@ -12,11 +12,12 @@ from composer.runtime.health.other_hosts import OtherHosts
 from composer.runtime.hold import wait_until_let_go
 from composer.runtime.local_part import LocalPart
 from composer.runtime.logs import system_logger
+from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.rewiring.goals_in_flight import wait_for_goals
 from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from composer.planning.snapshot import Snapshot
     from composer.processes.external_process import ExternalProcess
     from composer.processes.guardian_client import GuardianClient, NoGuardian
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.control.control_services import Commands
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.local_part import SystemRecorder
@@ -218,6 +220,18 @@ class System(LocalPart):
             if each:
                 self._stop_request.set_code(each)
         return ended
+
+    def lose_nodes(self, names: Collection[str]) -> None:
+        """End what waits, in any process, for servers of nodes whose process was killed."""
+        ros = self._any_ros
+        lost = find_participants(ros, names) if ros else frozenset()
+        self.lose_servers(lost)
+        self.workers.ask('lose_servers', lost)
+
+    def fail_request(self, failure: RequestFailure) -> None:
+        """See `LocalPart`."""
+        super().fail_request(failure)
+        self.workers.tell_all('fail_request', failure)
 
     def _kill_processes(self) -> None:
         self.workers.kill_all()

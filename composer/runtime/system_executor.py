@@ -8,14 +8,15 @@ import threading
 from collections import deque
 from contextlib import suppress
 from time import monotonic, sleep
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rclpy.executors import ExternalShutdownException, ShutdownException
 
-from composer.errors import ComposerError, EndedWhileWaitingError
+from composer.errors import EndedWhileWaitingError
 from composer.executor import ComposerExecutor
 from composer.executor.descriptors import ExecutorError
 from composer.runtime.behaviours.error_reports import ErrorReporter
+from composer.runtime.behaviours.requests import NoResponseError, RequestFailure, failed_call
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.reserved_methods import release
 
@@ -31,10 +32,6 @@ _RECOVERED_SEC = 10.0
 _MOST_NAMES = 5
 
 
-class NoResponseError(ComposerError):
-    """Raised by a service's callback that has no response, to keep rclpy from sending one."""
-
-
 class SystemExecutor(ComposerExecutor):
     """Runs the callbacks of all nodes, from `start` to `stop`.
 
@@ -44,10 +41,14 @@ class SystemExecutor(ComposerExecutor):
         log: Takes the text of an error outside all behaviours, after which the executor goes on.
         on_lost: Called when the context was shut down before `stop`.
         on_broken: Called when the executor cannot go on, with the reason.
+        on_unanswered: Called with each request over the middleware that gets no response.
 
     Attributes:
         errors: Logs the errors outside all behaviours.
+        runs_in_real_time: Whether its clocks are those of the middleware.
     """
+
+    runs_in_real_time = True
 
     def __init__(
         self,
@@ -56,11 +57,13 @@ class SystemExecutor(ComposerExecutor):
         log: Callable[[str], None],
         on_lost: Callable[[], None] | None = None,
         on_broken: Callable[[str], None] | None = None,
+        on_unanswered: Callable[[RequestFailure], None] | None = None,
     ) -> None:
         super().__init__(threads, context=context)
         self.errors = ErrorReporter(log)
         self._on_lost = on_lost
         self._on_broken = on_broken
+        self._on_unanswered = on_unanswered
         self._failures = deque([float('-inf')] * _MOST_FAILURES, maxlen=_MOST_FAILURES)
         self._builtins = dict(builtins.__dict__)
         self._is_stopped = False
@@ -88,6 +91,16 @@ class SystemExecutor(ComposerExecutor):
             # An error raised here would end the thread that spins.
             with suppress(Exception):
                 self.errors.report('a callback', error, format_internal_error)
+
+    def note_unanswered(self, service: Any, header: Any, error: BaseException) -> None:
+        """See the base class."""
+        # An error raised here would hide the other one.
+        with suppress(Exception):
+            if self._on_unanswered is not None:
+                name, sequence = service.service_name, header.request_id.sequence_number
+                sent_ns = header.source_timestamp if self.runs_in_real_time else None
+                failure = RequestFailure(name, sequence, sent_ns, failed_call(name, error))
+                self._on_unanswered(failure)
 
     def _keep_spinning(self) -> None:
         try:

@@ -46,6 +46,8 @@ _IN_REAL_TIME: Final = (
 class SimulatedExecutor(SystemExecutor):
     """Runs callbacks in virtual time; see `SystemExecutor` for the arguments."""
 
+    runs_in_real_time = False
+
     def __init__(
         self, threads: SimulatedThreads, context: Any, limit: int | None, **calls: Any
     ) -> None:

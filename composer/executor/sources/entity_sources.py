@@ -57,6 +57,9 @@ class LocalRequest(Protocol):
     def respond(self, response: Any) -> None:
         """Take the response."""
 
+    def fail(self, error: BaseException) -> None:
+        """Take what the callback raised: there is no response."""
+
 
 class TimerSource(EventSource):
     """A timer: due at its deadline, or when its ROS clock gets there; its events are resets."""
@@ -335,7 +338,11 @@ class ServiceSource(EventSource):
             return NOTHING
         self._note_taken()
         callback = service.callback
-        response = callback(request, service.srv_type.Response())
+        try:
+            response = callback(request, service.srv_type.Response())
+        except BaseException as error:
+            self.parts.executor.note_unanswered(service, header, error)
+            raise
         if self.parts.is_forked:
             end_child()
         if self._is_async(callback):
@@ -352,8 +359,12 @@ class ServiceSource(EventSource):
         callback = service.callback
         if self._is_async(callback):
             return self._respond_locally(callback, request)
-        # The response is in no variable: what nobody refers to need not be copied.
-        request.respond(self._answer(callback, request.message))
+        try:
+            # The response is in no variable: what nobody refers to need not be copied.
+            request.respond(self._answer(callback, request.message))
+        except BaseException as error:
+            request.fail(error)
+            raise
         return None
 
     def _answer(self, callback: Any, message: Any) -> Any:
@@ -363,7 +374,16 @@ class ServiceSource(EventSource):
         return response
 
     async def _respond_locally(self, callback: Any, request: LocalRequest) -> None:
-        request.respond(await self._answer(callback, request.message))
+        try:
+            request.respond(await self._answer(callback, request.message))
+        except BaseException as error:
+            request.fail(error)
+            raise
 
     async def _respond(self, response: Any, header: Any) -> None:
-        self.entity.send_response(await response, header)
+        try:
+            response = await response
+        except BaseException as error:
+            self.parts.executor.note_unanswered(self.entity, header, error)
+            raise
+        self.entity.send_response(response, header)

@@ -27,8 +27,6 @@ from composer.runtime.nodes.goals import Goal
 from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
-    from collections.abc import Container
-
     from rclpy.node import Node as RosNode
     from rclpy.task import Future
 
@@ -60,12 +58,11 @@ class ActionClient:
             WaitNotice(self._logger.info, f"action server '{self._name}'"),
             self._unavailable,
             self._unanswered,
+            self._lost,
         )
         self._behaviours = EventBehaviours(node, 'action client', spec.name)
         self._behaviours.change(_behaviours_of(spec))
         self._goals: WeakSet[Goal] = WeakSet()
-        # Why the last server went that a worker took with it.
-        self._loss: ActionNotAvailableError | None = None
         node.at_destruction.append(self._client.destroy)
 
     def send_goal(self, payload: Payload, timeout_sec: float | None) -> Goal:
@@ -80,11 +77,11 @@ class ActionClient:
         """
         message = self._convert(payload)
         goal = Goal(self._name, self._node.waits)
-        before = self._loss
+        losses = self._requests.losses
 
         def send() -> Future:
-            nonlocal before
-            before = self._loss
+            nonlocal losses
+            losses = self._requests.losses
             return self._client.send_goal_async(message, partial(self._take_feedback, goal))
 
         handle = self._requests.send(send, timeout_sec)
@@ -95,8 +92,8 @@ class ActionClient:
         self._goals.add(goal)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         # Its server may have gone before it was one of the goals.
-        if self._loss is not None and self._loss is not before:
-            goal.lose(self._loss)
+        if self._requests.losses != losses:
+            self.lose_server()
         return goal
 
     def delivery(self) -> tuple[str, str]:
@@ -118,13 +115,14 @@ class ActionClient:
         self._client.destroy()
         self._behaviours.destroy()
 
-    def lose_server(self, names: Container[str]) -> None:
-        """End the goals that were sent or accepted, if the server is one of these."""
-        if self._name in names:
-            message = f"the action server '{self._name}' ended before the goal did"
-            self._loss = ActionNotAvailableError(message)
-            self._requests.fail(self._loss)
-            self._lose_goals(self._loss)
+    def lose_server(self) -> None:
+        """End the goals that were sent or accepted, if the server was killed."""
+        if self._requests.lose():
+            self._lose_goals(self._lost())
+
+    def _lost(self) -> ActionNotAvailableError:
+        message = f"the action server '{self._name}' ended before the goal did"
+        return ActionNotAvailableError(message)
 
     def _lose_goals(self, error: ActionNotAvailableError) -> None:
         for goal in list(self._goals):
@@ -134,7 +132,7 @@ class ActionClient:
         message = f"no server of the action '{self._name}' appeared within {timeout_sec:g} s"
         return ActionNotAvailableError(message)
 
-    def _unanswered(self, timeout_sec: float, _begun: float) -> GoalTimeoutError:
+    def _unanswered(self, timeout_sec: float) -> GoalTimeoutError:
         message = f"the server of '{self._name}' did not answer within {timeout_sec:g} s"
         return GoalTimeoutError(message)
 

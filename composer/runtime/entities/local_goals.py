@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from composer.runtime.messages.local_services import LocalClient, LocalServer
+    from composer.runtime.middleware.lost_participants import LostParticipants
 
 
 class GoalServer(ActionServer):
@@ -138,7 +139,12 @@ class GoalClient(ActionClient):
 
     def server_is_ready(self) -> bool:
         """See the base class."""
-        return self.local.server is not None or super().server_is_ready()
+        if self.local.server is not None:
+            return True
+        lost: LostParticipants = self._node.lost
+        # The second of its services: the first one is there by then, too.
+        results = f'{self.local.key[0]}/_action/get_result'
+        return super().server_is_ready() and not lost.have_all_servers(self._node, results)
 
     def send_goal_async(
         self, goal: Any, feedback_callback: Any = None, goal_uuid: Any = None

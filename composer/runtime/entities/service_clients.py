@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import threading
+from contextlib import suppress
 from functools import partial
 from sys import getrefcount
+from time import time_ns
 from typing import TYPE_CHECKING, Any, Final
+from weakref import WeakKeyDictionary
 
 from composer.errors import (
     CallError,
     CallTimeoutError,
-    ServiceFailedError,
     ServiceNotAvailableError,
 )
 from composer.interfaces.classes import import_interface
@@ -19,13 +22,16 @@ from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 
 if TYPE_CHECKING:
-    from collections.abc import Container
-
     from rclpy.task import Future
 
     from composer.language.specs import Introspection, ServiceClientSpec
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.nodes.behaviour_node import Payload
     from composer.runtime.nodes.live_node import LiveNode
+
+
+# Fast DDS counts the fractions of a second otherwise.
+_STAMP_NS = 1000
 
 
 class ServiceClient:
@@ -34,7 +40,6 @@ class ServiceClient:
     def __init__(self, node: LiveNode, spec: ServiceClientSpec) -> None:
         service_class: Any = import_interface(spec.type)
         self._node = node
-        self._failures = node.system.failures
         self._convert = converter_for(service_class.Request).convert
         self._service = node.ros.resolve_service_name(spec.service)
         # Never in a group of behaviours: one that waits for a response would keep it out.
@@ -50,12 +55,16 @@ class ServiceClient:
         self._local.allow(is_allowed=spec.local_delivery)
         self._introspection: Introspection = 'off'
         self._introspect(spec.introspection)
+        # When those that were sent over the middleware were: after one time, before the other.
+        self._sent: WeakKeyDictionary[Future, tuple[int, int]] = WeakKeyDictionary()
+        self._sending = threading.Lock()
         self._requests = Requests(
             node.waits,
             self._is_available,
             WaitNotice(node.ros.get_logger().info, f"service '{self._service}'"),
             self._unavailable,
             self._unanswered,
+            self._lost,
             self._client.remove_pending_request,
         )
 
@@ -83,7 +92,11 @@ class ServiceClient:
     def _send(self, request: Any, *, is_held: bool, may_block: bool = False) -> Future:
         server = self._local.server
         if server is None:
-            return self._client.call_async(request)
+            with self._sending:
+                begun_ns = time_ns() - _STAMP_NS
+                future = self._client.call_async(request)
+                self._sent[future] = begun_ns, time_ns() + _STAMP_NS
+            return future
         if server.find_refusal is not None and (reason := server.find_refusal()):
             message = f"'{self._service}' answers no requests: {reason}"
             raise ServiceNotAvailableError(message)
@@ -113,20 +126,33 @@ class ServiceClient:
         self._node.system.services.remove(self._local)
         self._node.ros.destroy_client(self._client)
 
-    def lose_server(self, names: Container[str]) -> None:
-        """End the calls that wait for an answer, if the server is one of these."""
-        if self._service in names:
-            message = f"the server of '{self._service}' ended before it answered"
-            self._requests.fail(ServiceNotAvailableError(message))
+    def lose_server(self) -> None:
+        """End the calls that wait for an answer, if the server was killed."""
+        self._requests.lose()
+
+    def _lost(self) -> ServiceNotAvailableError:
+        return ServiceNotAvailableError(
+            f"the server of '{self._service}' ended before it answered"
+        )
+
+    def fail_request(self, failure: RequestFailure) -> bool:
+        """End the call that waits for the response to a request; return whether it is here."""
+        if failure.service != self._service:
+            return False
+        with self._sending, suppress(KeyError):
+            future = self._client.get_pending_request(failure.sequence)
+            first_ns, last_ns = self._sent[future]
+            is_it = failure.sent_ns is None or first_ns <= failure.sent_ns <= last_ns
+            if is_it and not future.done():
+                future.set_exception(failure.error)
+                return True
+        return False
 
     def _unavailable(self, timeout_sec: float) -> CallError:
         message = f"no server of '{self._service}' appeared within {timeout_sec:g} s"
         return ServiceNotAvailableError(message, help='is it running, and is that its name?')
 
-    def _unanswered(self, timeout_sec: float, begun: float) -> CallError:
-        if self._failures.since(self._service, begun):
-            message = f"'{self._service}' did not answer: its behaviour raised an error"
-            return ServiceFailedError(message, help="the server's log has the traceback")
+    def _unanswered(self, timeout_sec: float) -> CallError:
         message = f"'{self._service}' did not answer within {timeout_sec:g} s"
         return CallTimeoutError(message)
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from composer.errors import ServiceNotAvailableError
 from composer.interfaces.classes import import_interface
 from composer.runtime.behaviours.calls import FAILED
+from composer.runtime.behaviours.requests import NoResponseError, failed_call
 from composer.runtime.behaviours.running_calls import Owner
 from composer.runtime.messages.delivery_policies import queue_depth
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.messages.qos_profiles import configure_introspection, create_qos_profile
 from composer.runtime.nodes.callback_groups import LifecycleGate
-from composer.runtime.system_executor import NoResponseError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from composer.errors import CallError
     from composer.language.specs import Introspection, ServiceSpec
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -92,12 +94,7 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
         if response is not FAILED:
             tell('response', node_name, full_name, response)
             return response
-        if isinstance(node.gate, LifecycleGate) and node.gate.rests:
-            _tell_refusal(node, node.gate, owner)
-        elif node.gate.serves:
-            node.system.failures.note(full_name)
-        message = f'{owner} of {node.spec.key} has no response'
-        raise NoResponseError(message)
+        raise NoResponseError(_find_answer(node, full_name, owner))
 
     def serve(request: Any, _response: Any) -> Any:
         tell('request', node_name, full_name, request)
@@ -108,6 +105,19 @@ def _create_callback(node: LiveNode, spec: ServiceSpec) -> Callable[..., Any]:
         return checked(FAILED if node.gate.rests else await run(request))
 
     return serve_async if call.is_async else serve
+
+
+def _find_answer(node: LiveNode, full_name: str, owner: Owner) -> CallError:
+    """Return what a call raises whose request has no response."""
+    reason = ''
+    if isinstance(node.gate, LifecycleGate) and node.gate.rests and node.lifecycle is not None:
+        _tell_refusal(node, node.gate, owner)
+        reason = f"node '{node.spec.key}' is {node.lifecycle.state}"
+    elif not node.gate.serves:
+        reason = f"node '{node.spec.key}' stops"
+    if reason:
+        return ServiceNotAvailableError(f"'{full_name}' answers no requests: {reason}")
+    return failed_call(full_name)
 
 
 def _tell_refusal(node: LiveNode, gate: LifecycleGate, owner: Owner) -> None:

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.task import Future
 
+from composer.errors import ServiceNotAvailableError
+from composer.runtime.behaviours.requests import failed_call
 from composer.runtime.messages.delivery_policies import are_compatible, why_sent
 from composer.runtime.messages.ownership import ownership_of
 
@@ -87,12 +89,14 @@ class LocalServer(LocalEnd):
     Attributes:
         inbox: Takes requests: objects as `executor.open_inbox` says.
         clients: How many clients of the system have its name and type.
+        is_gone: Whether it was removed: what still waits for it is dropped.
         find_refusal: Returns why it refuses requests now, or an empty string; `None` if it never
             does.
     """
 
     inbox: Inbox
     clients = 0
+    is_gone = False
     find_refusal: Callable[[], str] | None = None
     executor: ComposerExecutor
 
@@ -107,27 +111,44 @@ class LocalServer(LocalEnd):
         service_class = self.ros.srv_type
         future = Future()
         taken = ownership_of(service_class.Request).take(request, is_held=is_held)
-        request = _Request(taken, future, ownership_of(service_class.Response).take)
+        request = _Request(taken, future, ownership_of(service_class.Response).take, self.key[0])
         if not (may_block and self.executor.execute_at_once(self.inbox, request)):
             self.inbox.put(request)
+        if self.is_gone:
+            self.inbox.messages.clear()
         return future
 
 
 class _Request:
     """A request that was handed over."""
 
-    __slots__ = ('_future', '_take', 'message')
+    __slots__ = ('_future', '_service', '_take', 'message')
 
-    def __init__(self, message: Any, future: Future, take: Callable[..., Any]) -> None:
+    def __init__(
+        self, message: Any, future: Future, take: Callable[..., Any], service: str
+    ) -> None:
         self.message = message
         self._future = future
         self._take = take
+        self._service = service
 
     def respond(self, response: Any) -> None:
         """Take the response, which the server may have kept."""
         is_held = getrefcount(response) > _UNHELD
         if not self._future.done():
             self._future.set_result(self._take(response, is_held=is_held))
+
+    def fail(self, error: BaseException) -> None:
+        """Let who waits know why there is no response."""
+        if not self._future.done():
+            self._future.set_exception(failed_call(self._service, error))
+
+    def __del__(self) -> None:
+        # It was pushed out of a full queue, or its server was removed: nobody will answer it.
+        if not self._future.done():
+            reason = 'its queue was full, or it was removed'
+            message = f"'{self._service}' dropped this request: {reason}"
+            self._future.set_exception(ServiceNotAvailableError(message))
 
 
 class _Probe:
@@ -192,6 +213,9 @@ class LocalServices:
         with self._lock, suppress(ValueError):
             known[end.key].remove(end)
         self._connect(end.key)
+        if isinstance(end, LocalServer):
+            end.is_gone = True
+            end.inbox.messages.clear()
 
     def forget(self, node: Any) -> None:
         """Forget all that belongs to an rclpy node."""

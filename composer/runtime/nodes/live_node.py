@@ -86,6 +86,7 @@ class LiveNode:
         limits: How long behaviours may run, by their owners.
         parameters: Its declared parameters, once its entities are created.
         lifecycle: Its lifecycle; `None` for a node without.
+        remote_parameters: Gets and sets those of other nodes.
     """
 
     spec: NodeSpec
@@ -101,6 +102,7 @@ class LiveNode:
     serving: CallbackGroup
     functions: Mapping[str, Callable[..., Any]]
     overrides: QosOverrides
+    remote_parameters: RemoteParameters
     created: dict[str, Callable[..., Any]] = field(default_factory=dict)
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
@@ -377,6 +379,14 @@ class LiveNode:
         if self.parameters and old.parameters:
             self.parameters.set_live |= old.parameters.set_live
 
+    def lose_servers(self) -> None:
+        """End the calls and goals that wait for servers that were killed."""
+        for section in ('service_clients', 'action_clients'):
+            clients: dict[str, Any] = self.entities[section]
+            for client in list(clients.values()):
+                client.lose_server()
+        self.remote_parameters.lose_servers()
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:
@@ -414,6 +424,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
     entries = system.parameter_files.get(spec.full_name, {})
     kind = LifecycleRosNode if spec.lifecycle else ComposedRosNode
     ros = kind(spec, system.context, system.ros_arguments, entries)
+    ros.lost = system.lost
     reserve(ros, 'the node', 'destroy_node')
     entities: defaultdict[str, dict[str, LiveEntity]] = defaultdict(dict)
     background = ReentrantCallbackGroup()
@@ -439,6 +450,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         serving=GatedMutuallyExclusiveGroup(gate),
         functions=system.functions,
         overrides=QosOverrides(ros),
+        remote_parameters=remote_parameters,
     )
     creation.node = live
     if (observe := system.observe) is not None:

@@ -93,6 +93,11 @@ class RemoteParameters:
         values = map(parameter_value_to_python, response.values)
         return dict(zip(wanted, values, strict=True))
 
+    def lose_servers(self) -> None:
+        """End the requests to nodes that were killed."""
+        for _, requests in list(self._clients.values()):
+            requests.lose()
+
     def _call(
         self, node_name: str, kind: Any, service: str, request: Any, timeout_sec: float | None
     ) -> Any:
@@ -119,9 +124,12 @@ class RemoteParameters:
             )
             return ServiceNotAvailableError(message)
 
-        def unanswered(timeout_sec: float, _begun: float) -> CallTimeoutError:
+        def unanswered(timeout_sec: float) -> CallTimeoutError:
             message = f"node '{full_name}' did not answer within {timeout_sec:g} s"
             return CallTimeoutError(message)
+
+        def lost() -> ServiceNotAvailableError:
+            return ServiceNotAvailableError(f"node '{full_name}' ended before it answered")
 
         client = self._ros.create_client(kind, service_name, callback_group=self._group)
         requests = Requests(
@@ -132,6 +140,7 @@ class RemoteParameters:
             ),
             unavailable,
             unanswered,
+            lost,
             client.remove_pending_request,
         )
         return client, requests

@@ -44,6 +44,7 @@ from rclpy.parameter_service import ParameterService
 from composer.ament import remaps_actions
 from composer.names import expand_name
 from composer.runtime.logs import has_rosout_publisher
+from composer.runtime.middleware.lost_participants import LostParticipants
 from composer.runtime.nodes.node_logger import NodeLogger
 
 if TYPE_CHECKING:
@@ -74,7 +75,10 @@ class ComposedRosNode(Node):
 
     Attributes:
         from_files: The parameters that the node has from its parameter files, by name.
+        lost: The participants that were killed, whose servers are not there for its clients.
     """
+
+    lost = LostParticipants()
 
     def __init__(
         self,
@@ -134,6 +138,15 @@ class ComposedRosNode(Node):
         if self._node_logger is None:
             self._node_logger = NodeLogger(super().get_logger().name)
         return self._node_logger
+
+    def create_client(self, *arguments: Any, **options: Any) -> Any:
+        """See the base class; a server that was killed is not ready for it."""
+        client = super().create_client(*arguments, **options)
+        is_ready, service = client.service_is_ready, client.service_name
+        client.service_is_ready = lambda: (
+            is_ready() and not self.lost.have_all_servers(self, service)
+        )
+        return client
 
     def resolve_action_name(self, name: str) -> str:
         """Return the full name of an action, which newer versions of ROS remap as a topic."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field
-from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.runtime.health.statistics import HealthRegistry
 from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.messages.local_services import LocalServices
 from composer.runtime.messages.ownership import ownership_of
+from composer.runtime.middleware.lost_participants import LostParticipants
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -45,27 +44,6 @@ EventKind: TypeAlias = Literal[
 Observe: TypeAlias = 'Callable[[EventKind, str, str, Any], None]'
 
 
-class ServiceFailures:
-    """When the behaviour of a service last raised an error, by the service's full name.
-
-    A client in the same system that times out can then tell its caller why.
-    """
-
-    def __init__(self) -> None:
-        self._times: dict[str, float] = {}
-        self._lock = threading.Lock()
-
-    def note(self, service: str) -> None:
-        """Note that a request got no response because the behaviour raised an error."""
-        with self._lock:
-            self._times[service] = monotonic()
-
-    def since(self, service: str, begun: float) -> bool:
-        """Return whether the service failed after `begun`, a time of `time.monotonic`."""
-        with self._lock:
-            return self._times.get(service, float('-inf')) >= begun
-
-
 def never() -> bool:
     """Return `False`."""
     return False
@@ -93,10 +71,10 @@ class SystemHandle:
         observe: Takes what happens, with a kind of `Event`, a node, a name and a value; `None` if
             nobody wants to know.
         is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
-        failures: Which services failed lately.
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
         services: Hands requests over between its nodes.
+        lost: The participants of DDS whose processes were killed.
     """
 
     context: Context
@@ -116,8 +94,8 @@ class SystemHandle:
     create_entity: Callable[[Any, str, Any], LiveEntity]
     observe: Observe | None = None
     is_outdated: Callable[[], bool] = never
-    failures: ServiceFailures = field(default_factory=ServiceFailures)
     health: HealthRegistry = field(default_factory=HealthRegistry)
+    lost: LostParticipants = field(default_factory=LostParticipants)
     topics: LocalTopics = field(init=False)
     services: LocalServices = field(init=False)
 

@@ -58,15 +58,15 @@ def do_at_once(
     return results()
 
 
-def ask_all(workers: Sequence[Worker], what: str) -> dict[str, Any]:
+def ask_all(workers: Sequence[Worker], what: str, *arguments: Any) -> dict[str, Any]:
     """Return what each worker answers that does in time, by name."""
     answers: dict[str, Any] = {}
 
     def ask(worker: Worker) -> None:
         with suppress(ComposerError):
-            answers[worker.name] = worker.call(what, timeout_sec=ANSWER_SEC)
+            answers[worker.name] = worker.call(what, *arguments, timeout_sec=ANSWER_SEC)
 
-    alive = [each for each in workers if each.is_alive]
+    alive = [each for each in workers if each.is_alive and each.has_imported]
     threads = [threading.Thread(target=ask, args=(each,), daemon=True) for each in alive]
     for thread in threads:
         thread.start()

@@ -36,16 +36,6 @@ def describe_losses(spec: SystemSpec, worker: str) -> str:
     return '\n'.join([text, *(f'  {line}' for line in lines)])
 
 
-def find_lost_servers(spec: SystemSpec, worker: str) -> dict[str, frozenset[str]]:
-    """Return the names that only nodes of a worker serve, by the section of their clients."""
-    gone, left = _split(spec, worker)
-    return {
-        taking: frozenset(_channels(gone, giving) - _channels(left, giving))
-        for giving, (taking, _) in _GIVEN.items()
-        if giving != 'publishers'
-    }
-
-
 def _split(
     spec: SystemSpec, worker: str
 ) -> tuple[list[NodeSpec], list[NodeSpec | DeclaredNodeSpec]]:

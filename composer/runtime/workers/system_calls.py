@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Protocol
 from composer.errors import ComposerError, ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator
     from contextlib import AbstractContextManager
 
     from composer.language.specs import ProcessState
     from composer.processes.channel import Functions
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.elsewhere import AwaitedProcess
 
 
@@ -32,8 +33,14 @@ class SystemOfWorkers(Protocol):
     def list_hidden(self) -> frozenset[str]:
         """Return the full names of its nodes that have not started."""
 
-    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
-        """End what waits for servers of a worker that has gone."""
+    def list_clients(self) -> frozenset[bytes]:
+        """Return the clients of services that its process knows."""
+
+    def lose_nodes(self, names: Collection[str]) -> None:
+        """End what waits for servers of nodes whose process was killed."""
+
+    def fail_request(self, failure: RequestFailure) -> None:
+        """End the call that waits for the response to a request."""
 
 
 class SystemCalls:
@@ -56,6 +63,7 @@ class SystemCalls:
         """Return what a worker may call, by name."""
         return {
             'request_stop': self.request_stop,
+            'fail_request': self._fail_request,
             'find_hidden': partial(self._find_hidden, worker),
             'process_state': self._describe_process,
             'process_has_come_to': self._has_come_to,
@@ -83,10 +91,17 @@ class SystemCalls:
         if self.system is not None:
             self.system.request_stop(code)
 
-    def lose_servers(self, lost: Mapping[str, Container[str]]) -> None:
-        """End what waits in the system's process for servers of a worker that has gone."""
+    def lose_nodes(self, names: Collection[str]) -> None:
+        """End what waits for servers of nodes whose process was killed."""
         if self.system is not None:
-            self.system.lose_servers(lost)
+            self.system.lose_nodes(names)
+
+    def _fail_request(self, failure: RequestFailure) -> None:
+        self._begun.fail_request(failure)
+
+    def list_clients(self) -> frozenset[bytes]:
+        """Return the clients of services that the system's process knows."""
+        return self._begun.list_clients()
 
     def list_hidden(self) -> frozenset[str]:
         """Return the nodes of the system's process that have not started."""

@@ -13,6 +13,8 @@ from composer.processes.guardian import STACKS_SIGNAL
 from composer.processes.worker_supervisor import ConnectedProcess, worker_rules
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from composer.language.specs import WorkerSpec
     from composer.processes.channel import Channel, Functions
     from composer.processes.worker_supervisor import WorkerSupervisor
@@ -30,6 +32,9 @@ _STEPS = ('create', 'run_on_start', 'open', 'start_waiting', 'be_up')
 class Worker:
     """A worker: its process, and what it runs.
 
+    Args:
+        list_clients: Returns the clients that it has to know before it serves.
+
     Attributes:
         request: What its process has imported, and imports when it is started again.
         next_request: What an edit has it import.
@@ -40,7 +45,11 @@ class Worker:
     """
 
     def __init__(
-        self, spec: WorkerSpec, supervisor: WorkerSupervisor, functions: Functions
+        self,
+        spec: WorkerSpec,
+        supervisor: WorkerSupervisor,
+        functions: Functions,
+        list_clients: Callable[[], frozenset[bytes]],
     ) -> None:
         self.spec = spec
         self.process = ConnectedProcess(spec, functions)
@@ -51,6 +60,7 @@ class Worker:
         self.is_up = False
         self.is_silent = False
         self._supervisor = supervisor
+        self._list_clients = list_clients
 
     @property
     def name(self) -> str:
@@ -99,7 +109,7 @@ class Worker:
             StartError: It failed.
         """
         if step == 'create':
-            arguments = (self.assignment,)
+            arguments = (self.assignment, self._list_clients())
         try:
             result = self.call(step, *arguments)
         except ChannelLostError as error:
@@ -169,6 +179,7 @@ class Worker:
             self.print_stacks()
             self._supervisor.kill(self.process)
             return ExitCode.FAILED, False
+        self.channel.tell('end')
         run = self.process.run
         if run is not None:
             run.gone.wait(_END_SEC)

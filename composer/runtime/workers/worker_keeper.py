@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import threading
-import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
 from composer.errors import ComposerError, ExitCode
 from composer.processes.worker_supervisor import WorkerSupervisor
-from composer.runtime.workers.losses import describe_losses, find_lost_servers
+from composer.runtime.workers.losses import describe_losses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from composer.language.specs import SystemSpec
     from composer.processes.external_process import ExternalProcess
@@ -40,7 +39,7 @@ class WorkerKeeper:
     Args:
         list_workers: Returns those that there are.
         end_system: Ends the system with an exit code.
-        lose_servers: Ends what waits in this process for servers that are lost.
+        lose_nodes: Ends what waits for servers of nodes whose process was killed.
 
     Attributes:
         supervisor: Runs their processes.
@@ -53,7 +52,7 @@ class WorkerKeeper:
         self,
         list_workers: Callable[[], Iterable[Worker]],
         end_system: Callable[[int], None],
-        lose_servers: Callable[[Mapping[str, frozenset[str]]], None],
+        lose_nodes: Callable[[Collection[str]], None],
     ) -> None:
         self.log = cast('EscapingLogger', _LazyLogger())
         self.supervisor = WorkerSupervisor(self.log, end_system, KILL_SEC)
@@ -64,7 +63,7 @@ class WorkerKeeper:
         self.is_stopping = False
         self._list_workers = list_workers
         self._end_system = end_system
-        self._lose_servers = lose_servers
+        self._lose_nodes = lose_nodes
         # Held while a worker is started again, or the system edited.
         self._lock = threading.Lock()
         self._restarting: Worker | None = None
@@ -110,19 +109,13 @@ class WorkerKeeper:
 
     def _tell_losses(self, process: ExternalProcess) -> None:
         worker = self._worker_of(process)
-        if worker is not None and worker.is_up and self.spec is not None:
+        if worker is None:
+            return
+        # Before it is started again: what comes then has the same names.
+        self._lose_nodes(worker.nodes)
+        if worker.is_up and self.spec is not None:
             name = worker.name
-            self._end_calls(find_lost_servers(self.spec, name))
             self.log.error(f"worker '{name}' has ended; {describe_losses(self.spec, name)}")
-
-    def _end_calls(self, lost: Mapping[str, frozenset[str]]) -> None:
-        """End the calls of all that are left to servers that are lost: DDS needs 20 s for that."""
-        ended = time.monotonic()
-        for worker in self._list_workers():
-            if worker.is_alive and worker.is_up:
-                with suppress(ComposerError):
-                    worker.channel.tell('lose_servers', lost, ended)
-        self._lose_servers(lost)
 
     def _act_on_end(self, process: ExternalProcess, code: int) -> None:
         worker = self._worker_of(process)

@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 from contextlib import ExitStack, suppress
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from composer.language.specs import WorkerSpec
     from composer.planning.snapshot import Snapshot
     from composer.runtime.behaviours.callables import Shape
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.rewiring.edit import Edit
     from composer.runtime.workers.assignment import Assignment, ImportRequest
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 _BY_SIGNAL = 128
 _LONGEST_EXIT_SEC = 10.0
 _POLL_SEC = 0.5
-_LATEST_LOSS_SEC = 1.0
 # Those of the system.
 _cpus_before = os.sched_getaffinity(0)
 _nice_before = os.getpriority(os.PRIO_PROCESS, 0)
@@ -84,9 +83,9 @@ class WorkerProcess:
         calls = (
             *(self.import_behaviours, self.keep_imports, self.drop_imports),
             *(self.create, self.run_on_start),
-            *(self.open, self.start_waiting, self.be_up, self.stop),
+            *(self.open, self.start_waiting, self.be_up, self.stop, self.end),
             *(self.ping, self.status, self.top, self.restart_node, self.find_hidden),
-            self.lose_servers,
+            *(self.lose_servers, self.fail_request),
             *(self.begin_edit, self.wait_for_goals, self.make_way, self.apply_edit),
             *(self.commit_edit, self.undo_edit, self.follow),
         )
@@ -164,8 +163,11 @@ class WorkerProcess:
         with suppress(_UnwantedError), self._fresh.pop_all():
             raise _UnwantedError
 
-    def create(self, assignment: Assignment) -> int:
+    def create(self, assignment: Assignment, clients: frozenset[bytes]) -> int:
         """Create the nodes; return what marks the processes that their behaviours start.
+
+        Args:
+            clients: See `LocalPart.create`.
 
         Raises:
             StartError: One of them cannot be created.
@@ -175,7 +177,7 @@ class WorkerProcess:
         self._levels.enter_context(log_levels(list(spec.nodes.values()), assignment.log_levels))
         self._system = WorkerSystem(assignment, self._functions, self._channel)
         threading.Thread(target=self._wait, name='worker', daemon=True).start()
-        self._system.create()
+        self._system.create(clients)
         return self._system.mark
 
     def _wait(self) -> None:
@@ -214,17 +216,14 @@ class WorkerProcess:
         """Stop the nodes; return the exit code, and whether all behaviours have ended."""
         system = self._system
         if system is None:
-            self._end_soon()
             return ExitCode.DONE, True
         system.is_told_to_stop = True
         system.request_stop()
-        code, has_ended = self._stop_nodes(system)
-        self._end_soon()
-        return code, has_ended
+        return self._stop_nodes(system)
 
-    def _end_soon(self) -> None:
-        # The answer is sent first.
-        threading.Timer(0.01, self._ended.set).start()
+    def end(self) -> None:
+        """Exit, as the answer of `stop` has come to the system's process."""
+        self._ended.set()
 
     def ping(self) -> None:
         """Answer, as long as threads of Python run here."""
@@ -245,15 +244,13 @@ class WorkerProcess:
         """Return the full names of the nodes that have not started."""
         return self._running.list_hidden()
 
-    def lose_servers(self, lost: Mapping[str, frozenset[str]], ended: float) -> None:
-        """End what waits for servers of a worker that has gone.
+    def lose_servers(self, participants: frozenset[bytes]) -> None:
+        """End what waits for servers that were killed; see `LocalPart.lose_servers`."""
+        self._running.lose_servers(participants)
 
-        Args:
-            lost: See `LocalPart.lose_servers`.
-            ended: When it has gone, by `time.monotonic`. Long after, others may serve already.
-        """
-        if monotonic() - ended < _LATEST_LOSS_SEC:
-            self._running.lose_servers(lost)
+    def fail_request(self, failure: RequestFailure) -> None:
+        """End the call that waits for the response to a request."""
+        self._running.take_failure(failure)
 
     def begin_edit(self, snapshot: Snapshot) -> None:
         """Begin an edit; all that was imported last is part of it."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from composer.language.specs import ProcessState, WorkerSpec
     from composer.planning.snapshot import Snapshot
     from composer.processes.channel import Channel
+    from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.workers.assignment import Assignment
 
 
@@ -71,6 +72,14 @@ class WorkerSystem(LocalPart):
     def mark(self) -> int:
         """What marks the processes that behaviours start here; 0 for nothing."""
         return self._guardian.mark
+
+    def fail_request(self, failure: RequestFailure) -> None:
+        """See `LocalPart`: the process of the system tells all."""
+        self._channel.tell('fail_request', failure)
+
+    def take_failure(self, failure: RequestFailure) -> None:
+        """End the call that waits for the response to a request, if it is in this process."""
+        super().fail_request(failure)
 
     def shutdown(self, code: int) -> None:
         """Ask for the end of the whole system."""

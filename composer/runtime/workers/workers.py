@@ -77,7 +77,7 @@ class Workers:
         # Those that the start, or an edit, brings.
         self._coming: dict[str, Worker] = {}
         self._calls = SystemCalls(self.find_hidden)
-        self._keeper = WorkerKeeper(self._list, self._calls.request_stop, self._calls.lose_servers)
+        self._keeper = WorkerKeeper(self._list, self._calls.request_stop, self._calls.lose_nodes)
         self._supervisor = self._keeper.supervisor
         self._watch = WorkerWatch(self._list, self._keeper.log)
         self._stops: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
@@ -141,7 +141,9 @@ class Workers:
             before = self._coming.get(name) or self._workers.get(name)
             if before is None or needs_new_process(before.spec, worker):
                 functions = self._calls.functions_for(name)
-                self._coming[name] = new = Worker(worker, self._supervisor, functions)
+                self._coming[name] = new = Worker(
+                    worker, self._supervisor, functions, self._calls.list_clients
+                )
                 new.spawn()
 
     def import_behaviours(
@@ -250,9 +252,13 @@ class Workers:
     def be_up(self) -> None:
         """Tell all workers that the system has started."""
         self._supervisor.tell_ends()
+        self.tell_all('be_up')
+
+    def tell_all(self, what: str, *arguments: Any) -> None:
+        """Tell all workers something."""
         for worker in self._list():
             with suppress(ComposerError):
-                worker.channel.tell('be_up')
+                worker.channel.tell(what, *arguments)
 
     def find(self, full_name: str) -> Worker | None:
         """Return the worker that a node runs in; `None` if none."""
@@ -279,9 +285,9 @@ class Workers:
                 hidden |= worker.call('find_hidden', timeout_sec=ANSWER_SEC)
         return hidden
 
-    def ask(self, what: str) -> dict[str, Any]:
+    def ask(self, what: str, *arguments: Any) -> dict[str, Any]:
         """Return what each worker answers that does, by name."""
-        return ask_all(self._list(), what)
+        return ask_all(self._list(), what, *arguments)
 
     def describe(self) -> list[dict[str, Any]]:
         """Return the state of each worker, with the nodes that run in it."""

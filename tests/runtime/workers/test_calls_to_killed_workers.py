@@ -79,3 +79,95 @@ def test_what_waits_for_a_killed_server_has_an_error(compose):
     for name in waiters:
         child.wait_for_line(f'{name} has {NO_ACTION if "goal" in name else NO_SERVICE}')
     assert child.stop() == 0
+
+
+ENDLESS = """
+    import composer
+
+    CALLS = {
+        'ask': lambda node: node.call('set', True, timeout=None).message,
+        'made': lambda node: node.call('made', True, timeout=None).message,
+        'raw': lambda node: node.call('raw', True, timeout=None).message,
+        'goal': lambda node: send(node).result(timeout=None).sequence[0],
+        'read': lambda node: read(node),
+    }
+
+    def send(node):
+        return node.send_goal('run', {'order': 1}, timeout=None)
+
+    def read(node):
+        return node.get_parameters('/server', ['pid'], timeout=None)['pid']
+
+    def begin_to_serve(node):
+        begin(node)
+        node.ros.set_parameters([Parameter('pid', value=os.getpid())])
+        node.create_service('std_srvs/srv/SetBool', 'made', answer)
+        node.ros.create_service(SetBool, 'raw', fill)
+
+    def fill(request, response):
+        response.message = str(os.getpid())
+        return response
+
+    def answer(node, request):
+        return {'message': str(os.getpid())}
+
+    def count(node, goal):
+        yield {'sequence': [1]}
+        return {'sequence': [os.getpid()]}
+
+    def ask_for_ever(node, what):
+        while True:
+            try:
+                print(f'{node.name} has {what} of {CALLS[what](node)}', flush=True)
+            except (composer.CallError, composer.GoalError) as error:
+                print(f'{node.name} has {type(error).__name__}', flush=True)
+            # ROS keeps ten responses of a service, and loses those that come faster than these go.
+            time.sleep(0.1)
+
+    async def ask_for_ever_async(node, what):
+        while True:
+            try:
+                response = await node.call_async('set', True, timeout=None)
+                print(f'{node.name} has {what} of {response.message}', flush=True)
+            except composer.CallError as error:
+                print(f'{node.name} has {type(error).__name__}', flush=True)
+            time.sleep(0.1)
+"""
+ASKS = [('', 'ask'), ('', 'goal'), *(('right', what) for what in ('await', 'made', 'raw', 'read'))]
+
+
+def asking(worker, what):
+    """Return a node that asks again and again, each time until it has an answer."""
+    clients = ', '.join(
+        f'{name}: {{type: std_srvs/srv/SetBool, external: true}}'
+        for name in ('set', 'made', 'raw')
+    )
+    behaviour = 'ask_for_ever_async' if what == 'await' else 'ask_for_ever'
+    timer = f'{{period: 0.1, behaviour: "parts:{behaviour}", with: {{what: {what}}}}}'
+    ends = f'service_clients: {{{clients}}}', CLIENTS[1], f'timers: {{t: {timer}}}'
+    return node(worker, 'warn_after: null', *ends)
+
+
+def test_calls_that_begin_after_a_kill_reach_the_server_that_comes_back(compose):
+    """The requests went to the killed one, which DDS lists for 20 s more."""
+    server = (
+        '{worker: left, on_start: {behaviour: parts:begin_to_serve}, parameters: {pid: 0}, '
+        'services: {set: {type: std_srvs/srv/SetBool, behaviour: parts:answer}}, '
+        'actions: {run: {type: test_msgs/action/Fibonacci, behaviour: parts:count}}}'
+    )
+    asks = {f'{what}_{worker or "here"}': asking(worker, what) for worker, what in ASKS}
+    nodes = {'server': server, **asks}
+    restart = 'workers: {left: {restart: {when: always, delay: 2}}}\n'
+    imports = '    from rclpy.parameter import Parameter\n    from std_srvs.srv import SetBool\n'
+    child = compose(system(nodes, restart), CODE + imports + MORE + ENDLESS)
+    child.wait_until_ready()
+    for turn in (1, 2, 3):
+        pid = pid_of(child, 'server', times=turn)
+        for name in asks:
+            child.wait_for_line(f'{name} has {name.partition("_")[0]} of {pid}')
+        if turn < 3:
+            os.kill(pid, signal.SIGKILL)
+    child.wait_for_line("[ask_here]: Waiting for service '/set'…")
+    child.wait_for_line("[goal_here]: Waiting for action server '/run'…")
+    child.wait_for_line("Waiting for the parameter services of node '/server'…")
+    assert child.stop() == 0
