@@ -30,8 +30,10 @@ settings.register_profile(
 )
 settings.load_profile('steady')
 
-# A shell lets its jobs in the background ignore SIGINT, and their children inherit that.
+# A shell lets its jobs in the background ignore SIGINT, and `nohup` SIGHUP; children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_terminal_summary(terminalreporter):
