@@ -12,7 +12,7 @@ import pytest
 from composer.checks.checker import check_system
 from composer.cli.common.file_selection import load_given
 from composer.diagnostics import has_errors
-from composer.errors import ComposerError, UsageError
+from composer.errors import ComposerError, StartError, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.values.start_reader import StartValueReader
 from composer.reports.text import render_finding
@@ -117,7 +117,12 @@ class TestedSystems:
         system = TestedSystem(loaded, seed=seed, real_limit_sec=self._limit_sec)
         self._systems.append(system)
         self._stack.callback(system.stop)
-        system.start()
+        try:
+            system.start()
+        except StartError:
+            # The test fails by it, or expects it.
+            system.errors_were_read = True
+            raise
         return system
 
     def stop(self) -> None:

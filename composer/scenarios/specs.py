@@ -150,11 +150,13 @@ class SetParametersStepSpec:
 
     Attributes:
         values: By full names of nodes, then by names of parameters.
+        atomically: Whether a node sets all of its values or none.
         refused: Whether the nodes must refuse them.
     """
 
     schedule: ScheduleSpec
     values: ValuesByNode
+    atomically: bool
     refused: bool
     path: DataPath
 

@@ -199,14 +199,20 @@ class ScenarioNode:
         """Return what the behaviours of a node share."""
         return self.node(node).behaviour_node.state
 
-    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
-        """Set parameters of a node.
+    def set_parameters(self, node: str, values: Mapping[str, Any], *, atomically: bool) -> None:
+        """Set parameters of a node, each by itself or all of them or none.
 
         Raises:
-            ParametersRefusedError: It refused one of them; the others may be set.
+            ParametersRefusedError: It refused one of them.
         """
         live = self.node(node)
         parameters = [Parameter(name, value=value) for name, value in values.items()]
+        if atomically:
+            result = live.ros.set_parameters_atomically(parameters)
+            if not result.successful:
+                message = f"node '{node}' refused all: {result.reason or 'no reason given'}"
+                raise ParametersRefusedError(message)
+            return
         results = live.ros.set_parameters(parameters)
         refused = [
             f"'{parameter.name}': {result.reason or 'no reason given'}"

@@ -67,6 +67,7 @@ class SimulatedSystem:
         shows_log: Whether the lines of loggers are printed, too.
 
     Attributes:
+        system: The one that it was given.
         events: What has happened, if `on_event` was not given.
     """
 
@@ -82,7 +83,7 @@ class SimulatedSystem:
         shows_log: bool = False,
     ) -> None:
         self.events: list[Event] = []
-        self._system = system
+        self.system = system
         self._on_event = on_event or self.events.append
         shuffle = Random(seed) if is_shuffled else None  # noqa: S311 - no secret
         self._threads = SimulatedThreads(shuffle, real_limit_sec)
@@ -175,14 +176,14 @@ class SimulatedSystem:
 
     def _read(self) -> Reading:
         """Import the behaviours, in virtual time."""
-        context = create_context(self._system, InterfaceCatalogue())
+        context = create_context(self.system, InterfaceCatalogue())
         if context is None:
-            message = f"'{self._system.positions.source.name}' cannot be read"
+            message = f"'{self.system.positions.source.name}' cannot be read"
             raise StartError(message)
         prefixes = import_declared(context.interfaces, lambda _line: None)
         variables = {**context.spec.environment, **extend_variables({}, prefixes)}
         self._stack.enter_context(environment_set({**variables, **_ALONE}))
-        folders = project_search_path(self._system.files)
+        folders = project_search_path(self.system.files)
         self._stack.enter_context(project_on_path(folders))
         before = self._stack.enter_context(forgotten_modules(folders))
         functions, _findings = import_behaviours(context, context.spec)
@@ -193,7 +194,7 @@ class SimulatedSystem:
         driver = load_system_text(_DRIVER_FILE).spec
         spec = without_processes(snapshot.spec, driver.nodes if driver else {})
         snapshot = replace(snapshot, spec=spec)
-        return Reading(spec, self._system.positions, functions, snapshot)
+        return Reading(spec, self.system.positions, functions, snapshot)
 
     @property
     def _running(self) -> SimulatedRun:
@@ -297,14 +298,19 @@ class SimulatedSystem:
             sent = self._started_node.send_goal(action, goal, timeout, type)
         return EnteringGoal(sent, self._threads)
 
-    def set_parameters(self, node: str, values: Mapping[str, Any]) -> None:
+    def set_parameters(
+        self, node: str, values: Mapping[str, Any], *, atomically: bool = False
+    ) -> None:
         """Set parameters of a node.
 
+        Args:
+            atomically: Whether it sets all of them or none.
+
         Raises:
-            ParametersRefusedError: It refused one of them; the others may be set.
+            ParametersRefusedError: It refused one of them; otherwise the others may be set.
         """
         with self._threads.entered():
-            self._started_node.set_parameters(node, values)
+            self._started_node.set_parameters(node, values, atomically=atomically)
 
     def parameters(self, node: str) -> dict[str, Any]:
         """Return the values of the parameters of a node."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from composer.errors import ExitCode
 from composer.scenarios.expectations.diffs import show_value
 from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from composer.simulation.events import Event
 
 _LEVELS = {name: rank for rank, name in enumerate(('debug', 'info', 'warn', 'error', 'fatal'))}
+# The name of the end of a system that has refused to start.
+START = 'start'
 # What rclpy calls it.
 _LEVELS['warning'] = _LEVELS['warn']
 # Of a longer traceback, the last lines are shown.
@@ -79,7 +82,12 @@ def check_unexpected_errors(case: CaseSpec, happened: Happenings) -> Iterator[Fa
     """Check that no behaviour raises an error that no expectation names; each is told once."""
     expected = [each for each in case.expectations if isinstance(each, ErrorExpectationSpec)]
     unexpected: dict[tuple[str, str, str], list[Event]] = {}
+    refused = [each for each in happened.of_kind('exit') if each.name == START]
+    ends = any(isinstance(each, ExitExpectationSpec) for each in case.expectations)
     for event in happened.of_kind('error'):
+        if refused and ends:
+            # The exit code says so.
+            continue
         is_expected = any(
             _is_meant(each, event) and each.window.has(event.time_ns) for each in expected
         )
@@ -122,11 +130,21 @@ def check_exit(expected: ExitExpectationSpec, happened: Happenings) -> Iterator[
         yield Failure(at, f'{wanted}, but it ended{at_time(found.time_ns)}', '', found.time_ns)
 
 
+def expects_refusal(case: CaseSpec) -> bool:
+    """Return whether a case expects an error or an end, which may be at the start."""
+    return any(
+        (isinstance(each, ExitExpectationSpec) and each.code == ExitCode.FAILED)
+        or (isinstance(each, ErrorExpectationSpec) and each.most != 0)
+        for each in case.expectations
+    )
+
+
 def check_unexpected_exit(case: CaseSpec, happened: Happenings) -> Iterator[Failure]:
     """Check that the system does not fail without an expectation that says so."""
     if any(isinstance(each, ExitExpectationSpec) for each in case.expectations):
         return
     for event in happened.of_kind('exit')[:1]:
-        if event.value:
+        # An error that is expected is the reason of a system that has refused to start.
+        if event.value and event.name != START:
             message = f'the system ended with exit code {event.value}{at_time(event.time_ns)}'
             yield Failure(case.path, message, '', event.time_ns)

@@ -39,6 +39,8 @@ def _check_call(step: CallStepSpec, outcome: Outcome) -> Iterator[Failure]:
             message = f'expected {what}{at_time(outcome.time_ns)} to fail, but there is a response'
             diff = f'+ {show_value(outcome.answer)}'
             yield Failure((*step.path, 'fails'), message, diff, outcome.time_ns, names)
+        elif outcome.end_ns is None and outcome.problem is None:
+            yield _failure(outcome, 'fails', f'{what} has not failed', names)
         return
     if outcome.answer is None:
         yield _failure(outcome, 'call', f'{what} has no response', names)

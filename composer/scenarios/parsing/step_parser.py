@@ -31,6 +31,7 @@ def parse_step(data: Mapping[str, Any], path: DataPath, names: NameReader) -> St
         return SetParametersStepSpec(
             schedule=_parse_schedule(data),
             values=parse_values(data['set_parameters'], names),
+            atomically=data.get('atomically', False),
             refused=data.get('refused', False),
             path=path,
         )

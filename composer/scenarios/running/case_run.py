@@ -7,12 +7,13 @@ import tempfile
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from composer.errors import ComposerError
+from composer.errors import ComposerError, ExitCode, StartError
 from composer.language.specs import ParameterFileSpec
 from composer.recordings.reading import read_recording
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
 from composer.scenarios.expectations.evaluation import evaluate
+from composer.scenarios.expectations.log_expectations import START, expects_refusal
 from composer.scenarios.running.case_results import CaseFailure, CaseResult
 from composer.scenarios.running.case_steps import CaseSteps
 from composer.scenarios.running.failure_reports import (
@@ -109,7 +110,13 @@ class _CaseRun:
             self.steps.schedule()
             if self._input:
                 self._input.schedule()
-            simulated.start(timeout=case.until_ns / NANOSECONDS)
+            try:
+                simulated.start(timeout=case.until_ns / NANOSECONDS)
+            except StartError as error:
+                if not expects_refusal(case):
+                    raise
+                self._note_refusal(error)
+                return self.steps.failures
             self._note_parameters()
             simulated.forward(max(0.0, case.until_ns / NANOSECONDS - simulated.now))
             self._stop()
@@ -126,12 +133,25 @@ class _CaseRun:
             time_ns = round(simulated.now * NANOSECONDS)
             simulated.events.append(Event(time_ns, 'exit', '', '', simulated.exit_code))
         number = len(simulated.events)
+        self.steps.has_ended = True
         self.stand_ins.end()
         simulated.stop()
         happened = [each for each in simulated.events if not is_of_stand_in(each)]
         at_stop = simulated.events[number:]
         left_out = {id(each) for each in at_stop if each.kind == 'state'}
         self.events = [each for each in happened if id(each) not in left_out]
+
+    def _note_refusal(self, error: StartError) -> None:
+        """Note that the system has refused to start, by an error of a behaviour or its own."""
+        events, system = self.simulated.events, self.simulated.system
+        time_ns = round(self.simulated.now * NANOSECONDS)
+        nodes = system.spec.nodes.values() if system.spec else ()
+        if not any(event.kind == 'error' for event in events):
+            named = (each for each in nodes if str(error).startswith(f"node '{each.key}'"))
+            node = next((each.full_name for each in named), '')
+            events.append(Event(time_ns, 'error', node, START, str(error)))
+        events.append(Event(time_ns, 'exit', '', START, int(ExitCode.FAILED)))
+        self.events = [each for each in events if not is_of_stand_in(each)]
 
     def _note_parameters(self) -> None:
         for expected in self._case.expectations:

@@ -38,6 +38,7 @@ class CaseSteps:
 
     Attributes:
         failures: Steps that could not be done.
+        has_ended: Whether the case has ended: what still comes is no outcome of a step.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class CaseSteps:
         self._case = case
         self._outcomes: list[Outcome] = []
         self.failures: list[CaseFailure] = []
+        self.has_ended = False
 
     def schedule(self) -> None:
         """Ask for each step at its first time; it asks for the next ones itself."""
@@ -70,7 +72,10 @@ class CaseSteps:
         # Until it has ended.
         self._outcomes.append(Outcome(step, time_ns))
         try:
-            self._outcomes[place] = self._do(step, time_ns)
+            outcome = self._do(step, time_ns)
+            if self.has_ended:
+                outcome = Outcome(step, time_ns, feedback=outcome.feedback)
+            self._outcomes[place] = outcome
         except SystemStoppingError:
             pass
         except ComposerError as error:
@@ -126,7 +131,7 @@ class CaseSteps:
         problem = None
         for node, values in step.values.items():
             try:
-                self._simulated.set_parameters(node, dict(values))
+                self._simulated.set_parameters(node, dict(values), atomically=step.atomically)
             except ParametersRefusedError as error:
                 problem = problem or str(error)
         return Outcome(step, time_ns, self._now_ns(), problem=problem)
