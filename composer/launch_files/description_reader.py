@@ -116,7 +116,7 @@ class DescriptionReader:
         )
 
     def _unset(self, entity: Any) -> None:
-        self.place.freeze(self.place.scope.when)
+        self.place.result.freeze(self.place.scope.when)
         self.place.scope.configurations.pop(
             self._resolver.text(private(entity, 'name')).text, None
         )
@@ -127,7 +127,7 @@ class DescriptionReader:
             self._resolver.text(name).text: self._resolver.text(value)
             for name, value in kept.items()
         }
-        self.place.freeze(self.place.scope.when)
+        self.place.result.freeze(self.place.scope.when)
         self.place.scope.configurations.clear()
         self.place.scope.configurations.update(values)
 
@@ -165,7 +165,7 @@ class DescriptionReader:
         path = Path(location.text)
         is_code = private(source, 'launch_description') is not None and not path.is_file()
         if path.is_file() or is_code or not location.text:
-            if self.place.freeze(location):
+            if self.place.result.freeze(location):
                 what = 'which file is included depends on arguments'
                 self.place.remark(f'{what}; here {path.name}')
             self.place.scope.fill(self.place.loader.context)
@@ -232,7 +232,7 @@ class DescriptionReader:
 
     def _unset_variable(self, entity: Any) -> None:
         name = self._resolver.text(private(entity, 'name')).text
-        self.place.freeze(self.place.scope.when)
+        self.place.result.freeze(self.place.scope.when)
         if name in self.place.scope.environment:
             del self.place.scope.environment[name]
         self.place.remark(f'the environment variable {name} is unset: a process cannot unset one')

@@ -173,7 +173,9 @@ class ProgramReader:
             full = f'/{values[1] or ""}/{values[0]}'.replace('//', '/').replace('//', '/')
             if entry.section == 'containers' and name.text in (values[0], full, full.lstrip('/')):
                 is_same = name.written() in (own, f'/{own}', full, full.lstrip('/'))
-                self._place.freeze(*() if is_same else (name, _text_of(own), _text_of(namespace)))
+                self._place.result.freeze(
+                    *() if is_same else (name, _text_of(own), _text_of(namespace))
+                )
                 return entry
         key = f'/{name.text.lstrip("/")}'
         if not name.is_constant:
@@ -319,7 +321,7 @@ class ProgramReader:
         if (sleep := SLEEP.fullmatch(prefix.text)) and prefix.is_constant:
             data['delay'] = float(sleep[2])
         elif prefix.parts:
-            place.freeze(prefix)
+            place.result.freeze(prefix)
         if prefix.text.strip() and 'delay' not in data:
             place.remark(f"the prefix '{prefix.text}' cannot be kept")
         self._add_restart(data, action)

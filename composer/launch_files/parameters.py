@@ -77,7 +77,7 @@ class ParameterReader:
             return
         name, value = item.value
         if when and (read.files or isinstance(value, dict)):
-            self._place.freeze(when)
+            self._place.result.freeze(when)
             when = ''
             if not item.holds:
                 return
@@ -101,7 +101,7 @@ class ParameterReader:
         if isinstance(written, tuple) and written and isinstance(written[0], list | tuple):
             return [self._resolver.text(each).typed() for each in written]
         if isinstance(written, tuple) and written and hasattr(written[0], 'perform'):
-            return self._command(written) or self._kept(self._resolver.text(written)).typed()
+            return self._command(written) or self._resolver.text(written).typed()
         return list(written) if isinstance(written, tuple) else written
 
     def _described(self, written: Any) -> Any:
@@ -112,16 +112,11 @@ class ParameterReader:
         if command:
             return command
         if kind in (None, str):
-            text = self._kept(self._resolver.text(value))
+            text = self._resolver.text(value)
             return text.written() if kind is str else text.typed()
         if isinstance(value, list | tuple) and value and not hasattr(value[0], 'perform'):
             return [self._typed(each, kind) for each in value]
         return self._typed(value, kind)
-
-    def _kept(self, text: Text) -> Text:
-        if self._resolver.is_new_file(text.text):
-            self._remark(f"'{text.text}' was written by the import itself: keep a copy of it")
-        return text
 
     def _typed(self, written: Any, kind: Any) -> Any:
         if isinstance(written, bool | int | float):
@@ -163,22 +158,22 @@ class ParameterReader:
             substitutes is not False and self._resolver.text(substitutes).text.lower() == 'true'
         )
         if not (isinstance(substitutes, bool | None)):
-            self._place.freeze(self._resolver.text(substitutes))
+            self._place.result.freeze(self._resolver.text(substitutes))
         data = read_file(path.text) if is_template else {}
         if not isinstance(data, dict):
             self._remark(f"'{path.text}' cannot be read: its substitutions are kept as text")
         elif '$(' in str(data):
             # It is copied, whichever file that is.
-            self._place.freeze(path)
+            self._place.result.freeze(path)
             read.files.append(NewFile(self._translated(data)))
             return
         if Path(path.text).is_file() or not Path(path.text).parent.is_dir():
             read.files.append(path.written())
-            if self._resolver.is_new_file(path.text):
+            if self._place.result.is_new_file(path.text):
                 self._keep_content(read, path)
         else:
             self._remark(f"there is no parameter file '{path.text}': launch goes on without it")
-            if self._place.depends(path):
+            if self._place.result.depends(path):
                 is_other = f'{path.code} != {path.text!r}'
                 read.files.append(only_if(is_other, path.written(), None, is_true=False))
 
@@ -203,7 +198,7 @@ class ParameterReader:
         )
         root = resolver.text(private(written, 'root_key')).written()
         # What else is in the file, and where, is that of the file as it is now.
-        self._place.freeze(path)
+        self._place.result.freeze(path)
         if has_substitutions:
             read.files.append(NewFile(self._translated(data), root))
         else:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +15,6 @@ if TYPE_CHECKING:
 
     from composer.launch_files.loading import Loader
 
-# A constant in an expression, and not the name in `args['name']`.
-_CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
-
 
 class Place:
     """A place in a launch file.
@@ -30,7 +25,6 @@ class Place:
     Attributes:
         origin: The line, as in `line 42 of x.launch.py`.
         depth: How many launch files include each other here.
-        started: When the import began, in seconds: files of before are not written by it.
     """
 
     def __init__(self, loader: Loader, given: dict[str, str]) -> None:
@@ -40,7 +34,6 @@ class Place:
         self.result = Imported()
         self.origin = ''
         self.depth = 0
-        self.started = time.time()
 
     def remark(self, text: str) -> None:
         """Note what cannot be kept, with the line that it comes from."""
@@ -68,31 +61,7 @@ class Place:
     def fix(self, names: Iterable[str]) -> None:
         """Note that the value of a configuration decides what foreign code does."""
         values = map(self.scope.configurations.get, names)
-        self.freeze(*(each for each in values if isinstance(each, Text)))
-
-    def freeze(self, *used: Text | str) -> bool:
-        """Keep the arguments in texts and expressions as they are; return whether there are any.
-
-        For what cannot follow them: it was read or decided by the import.
-        """
-        found = self.depends(*used)
-        for argument in found:
-            if not argument.fixed:
-                argument.fixed = True
-                self.freeze(argument.default or '')
-        return bool(found)
-
-    def depends(self, *used: Text | str) -> list[Argument]:
-        """Return the arguments in texts and expressions."""
-        codes = ' '.join(each if isinstance(each, str) else each.code for each in used)
-        codes = _CONSTANT.sub("''", codes)
-        return [
-            argument
-            for argument in self.result.arguments.values()
-            if re.search(
-                rf'(?<![\w.]){re.escape(written_in_expression(argument.name))}(?!\w)', codes
-            )
-        ]
+        self.result.freeze(*(each for each in values if isinstance(each, Text)))
 
     def add(self, section: str, name: str, data: dict[str, Any], action: Any) -> Entry:
         """Add an entry to the system."""
@@ -145,7 +114,7 @@ class Place:
         other.result.entries = list(self.result.entries)
         other.result.files = list(self.result.files)
         other.origin = self.origin
-        other.started = self.started
+        other.result.started = self.result.started
         other.depth = self.depth
         return other
 

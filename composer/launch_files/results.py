@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import re
+import tempfile
+import time
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
+from composer.expressions import written_in_expression
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from composer.launch_files.surroundings import Wait
     from composer.launch_files.texts import Text
+
+# A constant in an expression, and not the name in `args['name']`.
+_CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
 
 
 class LaunchError(ComposerError):
@@ -69,12 +76,49 @@ class Entry:
 
 @dataclass
 class Imported:
-    """What a launch file consists of."""
+    """What a launch file consists of.
+
+    Attributes:
+        started: When the import began, in seconds: files of before are not written by it.
+    """
 
     arguments: dict[str, Argument] = field(default_factory=dict)
     entries: list[Entry] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    started: float = field(default_factory=time.time)
+
+    def freeze(self, *used: Text | str) -> bool:
+        """Keep the arguments in texts and expressions as they are; return whether there are any.
+
+        For what cannot follow them: it was read or decided by the import.
+        """
+        found = self.depends(*used)
+        for argument in found:
+            if not argument.fixed:
+                argument.fixed = True
+                self.freeze(argument.default or '')
+        return bool(found)
+
+    def depends(self, *used: Text | str) -> list[Argument]:
+        """Return the arguments in texts and expressions."""
+        codes = ' '.join(each if isinstance(each, str) else each.code for each in used)
+        codes = _CONSTANT.sub("''", codes)
+        return [
+            argument
+            for argument in self.arguments.values()
+            if re.search(
+                rf'(?<![\w.]){re.escape(written_in_expression(argument.name))}(?!\w)', codes
+            )
+        ]
+
+    def is_new_file(self, path: str) -> bool:
+        """Return whether a helper of the launch file has written a file just now."""
+        try:
+            is_new = Path(path).stat().st_mtime >= self.started
+        except (OSError, ValueError):
+            return False
+        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
 
     def words(self, given: Mapping[str, str]) -> list[str]:
         """Return the arguments that the system is imported with, as on a command line."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,15 +122,7 @@ class Resolver:
     def _outcome(self, text: str) -> str:
         """Return what a substitution gives: of a new file, what stands in it."""
         path = unmarked(text)
-        return unmarked(repr(read_file(path))) if self.is_new_file(path) else path
-
-    def is_new_file(self, path: str) -> bool:
-        """Return whether a helper of the launch file has written a file just now."""
-        try:
-            is_new = Path(path).stat().st_mtime >= self._place.started
-        except (OSError, ValueError):
-            return False
-        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
+        return unmarked(repr(read_file(path))) if self._place.result.is_new_file(path) else path
 
     def _text(self, written: Any) -> Text:
         return _constant(str(written.text))
@@ -211,7 +202,7 @@ class Resolver:
         try:
             return translate(source, result)
         except UnlikeError:
-            self._place.freeze(source)
+            self._place.result.freeze(source)
             self._remark(f'{source.text} was resolved to {result}')
             return _constant(result)
 

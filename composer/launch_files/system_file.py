@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
-from composer.launch_files.texts import Computed, Text
+from composer.launch_files.texts import Computed, Text, constant, unmarked
 from composer.terminal import escape
 from composer.yaml_text.writer import RCL, render_yaml
 
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 _FIXED = 'What the launch file does depends on it: import again to change it.'
 _SECTIONS = ('processes', 'containers')
+_NEW_FILE = re.compile(rf'{re.escape(tempfile.gettempdir())}/[\w./-]+')
 _NAME = re.compile(r'[^A-Za-z0-9_.-]+')
 
 
@@ -38,14 +41,7 @@ def render_system(
         folder: Where it is to stand: paths below that are written as `{{ here }}/…`.
     """
     written = SystemFile()
-    lines = [f'# Imported from {_one_line(source)}.', 'version: 1']
-    fixed = [each for each in imported.arguments.values() if each.is_fixed_expression]
-    lines += _arguments([each for each in imported.arguments.values() if each not in fixed])
-    for index, each in enumerate(fixed):
-        # The name of a variable is that of no argument.
-        lines += ['', 'vars:'] if index == 0 else []
-        value = render_yaml({each.name: each.default.written() if each.default else ''})
-        lines += [f'  # {_FIXED}', *(f'  {line}' for line in value.splitlines())]
+    lines: list[str] = []
     common = _common_environment(imported.entries)
     if common:
         lines += ['', render_yaml({'environment': common}).rstrip()]
@@ -54,7 +50,8 @@ def render_system(
         if entries:
             lines += ['', f'{section}:']
         for entry in entries:
-            data = _from_here(_finished(imported, entry, common, written, stem), folder)
+            data = _finished(imported, entry, common, written, stem)
+            data = _from_here(_Copies(imported, written, f'{stem}.files').of(data), folder)
             lines += [f'  # {_one_line(entry.origin)}'] if entry.origin else []
             lines += [f'  {line}' for line in render_yaml({entry.name: data}).splitlines()]
     if not imported.entries:
@@ -62,8 +59,20 @@ def render_system(
     if imported.remarks:
         lines += ['', '# Not kept as it was:']
         lines += [f'# {_one_line(remark)}' for remark in imported.remarks]
-    written.text = '\n'.join(lines) + '\n'
+    written.text = '\n'.join([*_head(imported, source), *lines]) + '\n'
     return written
+
+
+def _head(imported: Imported, source: str) -> list[str]:
+    lines = [f'# Imported from {_one_line(source)}.', 'version: 1']
+    fixed = [each for each in imported.arguments.values() if each.is_fixed_expression]
+    lines += _arguments([each for each in imported.arguments.values() if each not in fixed])
+    for index, each in enumerate(fixed):
+        # The name of a variable is that of no argument.
+        lines += ['', 'vars:'] if index == 0 else []
+        value = render_yaml({each.name: each.default.written() if each.default else ''})
+        lines += [f'  # {_FIXED}', *(f'  {line}' for line in value.splitlines())]
+    return lines
 
 
 def _one_line(text: str) -> str:
@@ -131,6 +140,46 @@ def _finished(
     if waits:
         data['wait_for'] = waits[0] if len(waits) == 1 else waits
     return data
+
+
+@dataclass
+class _Copies:
+    """Copies files that the launch file has written, and that would be gone, beside the system.
+
+    Attributes:
+        folder: Where to, relative to the system.
+    """
+
+    imported: Imported
+    written: SystemFile
+    folder: str
+
+    def of(self, data: Any) -> Any:
+        """Return data with the paths of the copies in it."""
+        if isinstance(data, dict):
+            return {key: self.of(value) for key, value in data.items()}
+        if isinstance(data, list):
+            return [self.of(value) for value in data]
+        if not isinstance(data, str):
+            return data
+        text = _NEW_FILE.sub(self._copied, data)
+        value = data.value if isinstance(data, Computed) else data
+        return data if text == data else Computed(text, value)
+
+    def _copied(self, found: re.Match[str]) -> str:
+        path = Path(found[0])
+        if not self.imported.is_new_file(str(path)):
+            return found[0]
+        try:
+            content = path.read_text(encoding='utf-8')
+        except ValueError:
+            self.imported.remarks.append(f"'{path}' was written by the import: keep a copy of it")
+            return found[0]
+        # What the import has written into it does not change.
+        self.imported.freeze(constant(content))
+        name = f'{self.folder}/{path.name}'
+        self.written.files[name] = unmarked(content)
+        return f'{{{{ here }}}}/{name}'
 
 
 def _from_here(data: Any, folder: str | None) -> Any:

@@ -301,3 +301,18 @@ def test_paths_below_the_folder_of_the_system_are_relative_to_it(tmp_path):
     assert data['command'] == ['{{ here }}/parts/run.py', other]
     (spec,) = resolved(tmp_path, system).values()
     assert list(spec.command) == [program, other]
+
+
+def test_a_file_that_launch_code_writes_is_copied_beside_the_system(tmp_path):
+    written = tmp_path / 'view.rviz'
+
+    def write(context):
+        written.write_text(f'side: {context.launch_configurations["side"]}\n')
+        return [node(arguments=['-d', str(written), SIM])]
+
+    system = read(launch.OpaqueFunction(write))
+    (process,) = resolved(tmp_path, system).values()
+    assert process.arguments == ('-d', str(tmp_path / 'x.files' / 'view.rviz'), 'false')
+    assert system.files == {'x.files/view.rviz': 'side: left\n'}
+    # What stands in it does not follow the argument.
+    assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']

@@ -42,6 +42,7 @@ _END_SEC = 20.0
 _MOST_CHANGES = 12
 _MOST_CHOICES = 3
 _OPPOSITES = {'true': 'false', 'false': 'true'}
+_NOTHING = 'import launch\ngenerate_launch_description = launch.LaunchDescription\n'
 _FOUND = re.compile(r"find\('(\w+)'\)")
 
 
@@ -97,7 +98,10 @@ def _compare(
 
 
 def without_components(imported: Imported) -> Imported:
-    """Return a system with plain processes in place of containers: nothing loads stand-ins."""
+    """Return a system of plain processes, in place of containers, too: nothing loads stand-ins.
+
+    Without launch files that are not installed: nobody knows what they start.
+    """
     entries = [
         replace(
             entry,
@@ -105,7 +109,7 @@ def without_components(imported: Imported) -> Imported:
             data={key: value for key, value in entry.data.items() if key != 'components'},
         )
         for entry in imported.entries
-        if entry.action is not None or 'launch' in entry.data
+        if entry.action is not None
     ]
     return replace(imported, entries=entries)
 
@@ -131,6 +135,8 @@ class _Site:
         for entry in entries:
             if 'package' in entry.data:
                 self._add(str(_now(entry.data['package'])), str(_now(entry.data['executable'])))
+            if 'launch' in entry.data:
+                self._add_launch_file(str(_now(entry.data['launch'])))
             for word in entry.data.get('command', ())[:1]:
                 program = str(_now(word))
                 if '/' not in program and shutil.which(program) is None:
@@ -160,6 +166,17 @@ class _Site:
                 (folder / path.name).symlink_to(path)
         _make_program(folder / executable)
 
+    def _add_launch_file(self, path: str) -> None:
+        """Make an empty launch file of a package that is not installed."""
+        package, _, relative = path.partition('/')
+        if path.startswith(('/', '.')) or not relative or find_share(package) is not None:
+            return
+        self._add_package(package)
+        file = self._prefix / 'share' / package / relative
+        file.parent.mkdir(parents=True, exist_ok=True)
+        is_python, is_xml = file.suffix == '.py', file.suffix == '.xml'
+        file.write_text(_NOTHING if is_python else '<launch/>' if is_xml else 'launch: []')
+
     def _add_package(self, package: str) -> None:
         """List a package in the prefix; its files are those that are installed, if any are."""
         share = find_share(package)
@@ -168,7 +185,7 @@ class _Site:
         own = self._prefix / 'share' / package
         if not own.exists():
             if share is None:
-                own.mkdir()
+                own.mkdir(parents=True)
             else:
                 own.symlink_to(share)
                 self.replaced[str(own)] = str(share)
