@@ -62,7 +62,8 @@ class CheckContext:
         # A copy asks, so that no circle keeps this context until garbage is collected: for a
         # large system that would stop its callbacks for long, after each edit.
         asked = replace(self)
-        return BehaviourReader(self.modules, self.catalogue, asked.has_real_type)
+        names = {each.behaviour.module: None for each in self.all_bindings()}
+        return BehaviourReader(self.modules, self.catalogue, asked.has_real_type, names)
 
     @cached_property
     def incomplete(self) -> set[DataPath]:

@@ -38,6 +38,7 @@ from composer.inference.values import (
     constant,
     is_chosen,
     join,
+    share,
 )
 from composer.inference.wires import Wire, wire_of
 from composer.language.bindings import node_bindings
@@ -62,6 +63,7 @@ class BehaviourReader:
 
     Args:
         has_real_type: Whether the type of an entity is the one that is meant.
+        names: The modules of all behaviours: each may change what another one reads.
     """
 
     def __init__(
@@ -69,9 +71,12 @@ class BehaviourReader:
         modules: ModuleFinder,
         catalogue: InterfaceCatalogue,
         has_real_type: Callable[[EndSpec], bool],
+        names: abc.Iterable[str],
     ) -> None:
         self._finder = modules
         self._modules = ProjectModules(modules)
+        for name in names:
+            self._modules.find(name)
         self._types = MessageTypes(catalogue)
         self._has_real_type = has_real_type
         # By behaviour and what it is given: by questions, and by their answers.
@@ -173,7 +178,6 @@ class BehaviourReader:
             return missing_reading()
         if not is_of_project(module):
             return unknown_reading()
-        self._modules.find(binding.behaviour.module)
         run = Run(facts, self._modules, self._types, self._steps_left)
         evaluator = Evaluator(run)
         try:
@@ -251,7 +255,7 @@ def _method_of(evaluator: Evaluator, module: ModuleSource, behaviour: BehaviourS
     if not isinstance(made, Instance):
         return UNKNOWN
     # All behaviours of the class have it.
-    made.is_shared = True
+    share(made)
     return evaluator.classes.class_attribute(of, behaviour.method_name, made) or UNKNOWN
 
 

@@ -53,6 +53,7 @@ class Run:
         held_locks: The locks that are held, and where they were taken.
         probed: The names that a condition hangs on, while one is looked at.
         moves: How often something was read that changes by itself.
+        changes: How often something that others hold, too, was changed.
         is_silent: Whether the place is read once more later.
         is_at_top: Whether what is made at the place lasts as long as its module.
         steps: How many steps it has taken.
@@ -77,6 +78,7 @@ class Run:
         self.held_locks: list[tuple[Primitive, Place]] = []
         self.probed: set[Awaited] | None = None
         self.moves = 0
+        self.changes = 0
         self.is_silent = False
         self.is_at_top = False
         self.steps = 0

@@ -8,8 +8,9 @@ import sys
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from composer.inference.classes.attribute_stores import ANY, CHANGING, find_stores
-from composer.inference.values import UNKNOWN, External, Primitive, Value
+from composer.inference.classes.attribute_stores import ANY, find_stores
+from composer.inference.values import UNKNOWN, External, Value
+from composer.python_source.changed_names import ALL, NOTHING, ChangedNames
 from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import BLOCKS, list_children, list_nodes
 
@@ -40,6 +41,18 @@ class TopNames:
             if not isinstance(statement, _BINDING):
                 blocks = (getattr(statement, name, ()) for name in BLOCKS)
                 pending += [(each, True) for block in blocks for each in block]
+
+    @cached_property
+    def imports(self) -> list[ast.Import | ast.ImportFrom]:
+        """The imports of the module, those in functions included."""
+        return [each for each in self._nodes if isinstance(each, ast.Import | ast.ImportFrom)]
+
+    def imports_of(self, name: str) -> Iterator[tuple[str, ast.ImportFrom]]:
+        """Yield the imports of a name from some module, and what it is called then."""
+        for statement in self.imports:
+            for alias in statement.names:
+                if isinstance(statement, ast.ImportFrom) and alias.name == name:
+                    yield alias.asname or name, statement
 
     def _stored(self, statement: ast.AST) -> Iterator[str]:
         if isinstance(statement, _BINDING):
@@ -75,15 +88,26 @@ class TopNames:
         return frozenset(found)
 
     @cached_property
+    def changes(self) -> ChangedNames:
+        """What code changes of what the names hold."""
+        return ChangedNames(self._body)
+
+    @cached_property
     def changed(self) -> frozenset[str]:
         """Names that functions store, and those whose values are changed somewhere."""
-        found = set(self.stored_again)
-        for node in self._nodes:
-            match node:
-                case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method)):
-                    if method in CHANGING:
-                        found.add(name)
-        return frozenset(found)
+        changes = self.changes.all_changes()
+        return self.stored_again | {name for name, change in changes.items() if change == ALL}
+
+    @cached_property
+    def is_dynamic(self) -> bool:
+        """Whether code may store any name: `globals()['x'] = 1`, `exec`."""
+        return any(
+            name in ('exec', 'eval') or self.changes.change_at(each) != NOTHING
+            for each in self._nodes
+            if isinstance(each, ast.Call)
+            for name in [getattr(each.func, 'id', '')]
+            if name in ('exec', 'eval', 'globals', 'vars')
+        )
 
     @cached_property
     def stored_again(self) -> frozenset[str]:
@@ -138,9 +162,25 @@ class ProjectModules:
         found: list[AttributeStore] = []
         for key, module in tuple(self._read.items()):
             if key not in self._stores:
-                self._stores[key] = find_stores(module.body)
+                self._stores[key] = find_stores(module.body, self.top(module).changes)
             found += [*self._stores[key].get(name, ()), *self._stores[key].get(ANY, ())]
         return found
+
+    def change_of(self, module: ModuleSource, name: str) -> int:
+        """Return how deep any module changes what a name at the top of one holds."""
+        found = [self.top(module).changes.change_of(name)]
+        found += [ALL] * self.is_stored_anyhow(module, name)
+        full_name = f'{self._names.get(id(module))}.{name}'
+        for other in tuple(self._read.values()):
+            for alias, statement in self.top(other).imports_of(name):
+                if self.imported(other, statement, alias) == full_name:
+                    found.append(self.top(other).changes.change_of(alias))
+        return min(found)
+
+    def is_stored_anyhow(self, module: ModuleSource, name: str) -> bool:
+        """Return whether code may store a name of a module other than by its statements."""
+        stores = self.stores_of(name)
+        return self.top(module).is_dynamic or any(each.owner is None for each in stores)
 
     def is_patched(self, name: str) -> bool:
         """Return whether a module that was read stores an attribute of this name at its top."""
@@ -152,7 +192,13 @@ class ProjectModules:
         if not isinstance(module, ModuleSource) or not is_of_project(module):
             return None
         self._names.setdefault(id(module), name)
-        self._read[id(module)] = module
+        if id(module) not in self._read:
+            self._read[id(module)] = module
+            for statement in self.top(module).imports:
+                # What they change of it counts, too.
+                for alias in statement.names:
+                    stored = alias.asname or alias.name.partition('.')[0]
+                    self.split(self.imported(module, statement, stored))
         return module
 
     def star_home(self, module: ModuleSource, name: str) -> ModuleSource | None:
@@ -208,9 +254,7 @@ class ProjectModules:
         self._under_way.add(key)
         try:
             value = evaluate(statement, is_conditional)
-            # What methods change is known only of what is no container: `event.clear()`.
-            is_kept = name not in top.changed or isinstance(value, Primitive)
-            self._values[key] = value if is_kept else UNKNOWN
+            self._values[key] = value
         finally:
             self._under_way.discard(key)
         return self._values[key]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Of more alternatives, nothing is known.
 _MOST_ALTERNATIVES = 16
+# What shows that another object changes.
+_VIEWS: tuple[type, ...] = (type({}.keys()), type({}.values()), type({}.items()))
 
 
 @record
@@ -221,6 +223,8 @@ class Mapping:
         before = self.entries.get(key)
         if before is not None and depth > self.depth:
             value = join([before[0], value])
+        # Whether one that is stored on a condition is there, is not known.
+        self.has_unknown |= before is None and depth > self.depth
         self.entries[key] = (value, place)
 
 
@@ -245,6 +249,11 @@ class Sequence:
     def is_whole(self) -> bool:
         """Whether all of its items are known."""
         return not (self.is_open or self.is_lost)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether nothing can change it, but for what is in it."""
+        return self.kind in (tuple, frozenset, range)
 
     @property
     def is_ordered(self) -> bool:
@@ -293,12 +302,14 @@ class Class:
     Attributes:
         outer: The `Scope` around it; `None` for the module's own.
         attributes: What was stored in it later, wherever that was.
+        is_open: As that of `Instance`.
     """
 
     module: ModuleSource
     definition: ast.ClassDef
     outer: Any = None
     attributes: dict[str, Value] = field(default_factory=dict)
+    is_open: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -532,6 +543,37 @@ def _is_acting(value: Value) -> bool:
     return isinstance(value, Function | Partial | Class | NodeValue)
 
 
+def held_by(value: Value) -> list[Value]:
+    """Return what can be reached from a value in one step."""
+    match value:
+        case Alternatives(values=values):
+            return list(values)
+        case Sequence(items=items):
+            return [each for each, _ in items]
+        case Mapping():
+            return [each for each, _ in value.entries.values()] + [value.others or UNKNOWN]
+        case Instance(attributes=attributes) | Class(attributes=attributes):
+            return list(attributes.values())
+        case BoundMethod(owner=owner) | Super(owner=owner):
+            return [owner]
+        case Generated(yielded=yielded, returned=returned):
+            return [yielded, returned]
+        case Awaitable(result=result):
+            return [result]
+    return []
+
+
+def share(value: Value) -> None:
+    """Note that other behaviours may have the objects in a value, too."""
+    pending = [value]
+    for each in pending:
+        if isinstance(each, Instance) and not each.is_shared:
+            each.is_shared = True
+            pending += held_by(each)
+        elif isinstance(each, Alternatives):
+            pending += each.values
+
+
 def is_none(value: Value) -> bool:
     """Return whether a value is `None`, whoever decided on it."""
     return isinstance(value, Constant) and value.value is None
@@ -574,8 +616,10 @@ def _truth_of(value: Value) -> bool | None:
             return True
         case Message() | ProjectModule() | External() | Awaitable():
             return True
-        case Mapping() | Sequence() if not value.is_open and not value.is_lost:
-            return bool(value.entries if isinstance(value, Mapping) else value.items)
+        case Mapping() if not value.is_open and not value.is_lost:
+            return bool(value.entries)
+        case Sequence() if value.is_whole and value.kind not in _VIEWS:
+            return bool(value.items)
     return None
 
 

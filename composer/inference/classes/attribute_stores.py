@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.python_source.changed_names import NOTHING, ChangedNames
 from composer.python_source.syntax import list_children
 from composer.records import record
 
@@ -13,13 +14,6 @@ if TYPE_CHECKING:
 
 # Stands for the names of attributes that are not written out.
 ANY = '*'
-# Methods that change what they are called on.
-CHANGING = frozenset(
-    {
-        *('add', 'append', 'appendleft', 'clear', 'discard', 'extend', 'insert', 'pop', 'popitem'),
-        *('popleft', 'remove', 'reverse', 'setdefault', 'sort', 'update'),
-    }
-)
 # Methods in which an object is made.
 _MAKING = frozenset({'__init__', '__new__', '__post_init__', '__set_name__'})
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -32,38 +26,44 @@ class AttributeStore:
     Attributes:
         owner: The class whose method stores it in its first parameter; `None` for other stores.
         is_made: Whether that is done while the object is made.
-        is_inside: Whether it changes what the attribute holds: a list, a dictionary.
+        inside: How deep it changes what the attribute holds: a list, a dictionary.
     """
 
     owner: ast.ClassDef | None
     is_made: bool
-    is_inside: bool = False
+    inside: int = NOTHING
 
 
-def find_stores(body: Iterable[ast.stmt]) -> dict[str, list[AttributeStore]]:
-    """Return the places that store attributes, by the names of these."""
+def find_stores(
+    body: Iterable[ast.stmt], changes: ChangedNames
+) -> dict[str, list[AttributeStore]]:
+    """Return the places that store attributes, or may do so, by the names of these."""
     found: dict[str, list[AttributeStore]] = {}
     for node, owner, method in _walk(body):
-        is_inside = False
+        inside, is_direct = NOTHING, True
         match node:
-            case ast.Attribute(value=target, attr=name) if not isinstance(node.ctx, ast.Load):
-                known = owner if _is_first(target, method) else None
+            case ast.Attribute(value=target, attr=name) if isinstance(node.ctx, ast.Load):
+                inside, is_direct = changes.change_at(node), changes.is_changed_here(node)
+                if name == '__setattr__' and isinstance(target, ast.Call):
+                    name, target, inside = ANY, ast.Name(_first(method)), NOTHING
+                elif inside == NOTHING:
+                    continue
+            case ast.Attribute(value=target, attr=name):
+                pass
             case ast.Call(func=ast.Name('setattr'), args=[target, ast.Constant(str(name)), _]):
-                known = owner if _is_first(target, method) else None
+                pass
             case ast.Call(func=ast.Name('setattr'), args=[target, _, _]):
-                name, known = ANY, owner if _is_first(target, method) else None
-            case ast.Subscript(value=ast.Attribute(value=target, attr=name)):
-                if isinstance(node.ctx, ast.Load):
+                name = ANY
+            case ast.Name() as target if owner and _is_first(target, method):
+                if not changes.is_given(target):
                     continue
-                known, is_inside = owner if _is_first(target, method) else None, True
-            case ast.Call(func=ast.Attribute(value=ast.Attribute(value=target, attr=name))):
-                if node.func.attr not in CHANGING:  # type: ignore[attr-defined]
-                    continue
-                known, is_inside = owner if _is_first(target, method) else None, True
+                name, is_direct = ANY, False
             case _:
                 continue
+        known = owner if _is_first(target, method) else None
         is_made = known is not None and method is not None and method.name in _MAKING
-        found.setdefault(name, []).append(AttributeStore(known, is_made, is_inside))
+        store = AttributeStore(known, is_made and is_direct, inside)
+        found.setdefault(name, []).append(store)
     return found
 
 
@@ -87,9 +87,14 @@ def _walk(body: Iterable[ast.stmt]) -> Iterator[tuple[ast.AST, ast.ClassDef | No
 
 def _is_first(target: ast.expr, method: _Method) -> bool:
     """Return whether an expression is the object of a method."""
-    if method is None or not isinstance(target, ast.Name):
-        return False
+    return isinstance(target, ast.Name) and bool(target.id) and target.id == _first(method)
+
+
+def _first(method: _Method) -> str:
+    """Return the name of the object of a method."""
+    if method is None:
+        return ''
     if {ast.unparse(each) for each in method.decorator_list} & {'classmethod', 'staticmethod'}:
-        return False
+        return ''
     first = [*method.args.posonlyargs, *method.args.args][:1]
-    return [each.arg for each in first] == [target.id]
+    return first[0].arg if first else ''

@@ -48,8 +48,6 @@ class MadeCallables(Part):
             return Partial(External(f'{name}()'), arguments)
         calls: dict[str, Callable[[Arguments, Place], Value]] = {
             'builtins.property': self._make_property,
-            'collections.namedtuple': self._make_tuple,
-            'types.SimpleNamespace': self._make_namespace,
             'functools.partialmethod': self._make_method,
             'functools.singledispatch()': self._dispatch,
             'operator.attrgetter()': self._read_attributes,
@@ -68,24 +66,6 @@ class MadeCallables(Part):
         getter, setter = arguments.get(0, 'fget'), arguments.get(1, 'fset')
         stored = setter.value if setter else None
         return Descriptor('property', getter.value, stored) if getter else UNKNOWN
-
-    def _make_tuple(self, arguments: Arguments, place: Place) -> Value:
-        """Return the class that `namedtuple('Step', 'topic payload')` makes."""
-        fields = arguments.get(1, 'field_names')
-        names = _texts(fields.value) if fields else None
-        if names is None or arguments.get(2, 'defaults') or arguments.get(2, 'rename'):
-            self._evaluator.calls.escape_all(arguments)
-            return UNKNOWN
-        body = [
-            ast.AnnAssign(ast.Name(name, ast.Store()), ast.Constant(None), None, 1)
-            for name in names
-        ]
-        return _class_at(place, 'typing.NamedTuple', body)
-
-    def _make_namespace(self, arguments: Arguments, place: Place) -> Value:
-        of = _class_at(place, 'types.SimpleNamespace', [])
-        made: Value = self._evaluator.classes.instantiate(of, arguments)
-        return made
 
     def _read_attributes(self, arguments: Arguments, place: Place) -> Value:
         *names, owner = arguments.positional
@@ -174,32 +154,6 @@ class MadeCallables(Part):
         with self._evaluator.run.silence():
             value: Value = self._evaluator.evaluate(expression, scope)
         return value
-
-
-def _class_at(place: Place, base: str, body: list[ast.AnnAssign]) -> Class:
-    """Return a class that the library makes at a place."""
-    definition = ast.ClassDef(
-        name=base.rpartition('.')[2],
-        bases=[ast.Name(base, ast.Load())],
-        keywords=[],
-        body=list(body),
-        decorator_list=[],
-    )
-    ast.copy_location(definition, place.node)
-    for node in ast.walk(definition):
-        ast.copy_location(node, place.node)
-    return Class(place.module, definition)
-
-
-def _texts(value: Value) -> list[str] | None:
-    """Return the names that are written as a text, or as a list of texts."""
-    match value:
-        case Constant(value=str(text)):
-            return text.replace(',', ' ').split()
-        case Sequence() if value.is_whole:
-            found = [item.value for item, _ in value.items if isinstance(item, Constant)]
-            return found if len(found) == len(value.items) else None
-    return None
 
 
 def _is_class(value: Value) -> bool:

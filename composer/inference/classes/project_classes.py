@@ -32,9 +32,11 @@ from composer.inference.values import (
     Value,
     alternatives,
     constant,
+    held_by,
     is_none,
     join,
 )
+from composer.python_source.changed_names import ALL, NOTHING
 
 if TYPE_CHECKING:
     from composer.inference.classes.attribute_stores import AttributeStore
@@ -126,7 +128,8 @@ class Classes(Part):
             case Instance():
                 getter = self.class_attribute(value.of, '__get__', value)
                 return value if getter is None else self._follow(getter, owner or UNKNOWN, of)
-        if not self._changes(of, name, value, is_shared=True):
+        is_open = of.is_open and not _is_lasting(value)
+        if not is_open and not self._changes(of, name, value, is_shared=True):
             return value
         # Other behaviours may have stored something else, or nothing yet.
         return join([UNKNOWN, *self._stored_in_classes(of, name)])
@@ -223,19 +226,31 @@ class Classes(Part):
         if name in owner.doubtful and found is not None:
             stored = join([stored, found])
         held_now = alternatives(stored)
+        if owner.is_shared and any(each.inside == ALL for each in self._every_store(name)):
+            for each in held_now:
+                if isinstance(each, Instance):
+                    self._evaluator.escape(each)
         if any(map(_is_lasting, held_now)) and all(_is_lasting(e) or is_none(e) for e in held_now):
             return stored
         if owner.is_open:
             return join(map(_widen, alternatives(stored)))
-        if len(self._stores(name)) == 1 and not self._is_changed_inside(owner, name, stored):
-            return stored
-        if not self._changes(owner.of, name, stored, is_shared=owner.is_shared):
-            return stored
+        if not self._is_changed_inside(owner, name, stored):
+            is_once = len(self._stores(name)) == 1
+            if is_once or not self._changes(owner.of, name, stored, is_shared=owner.is_shared):
+                return stored
         return UNKNOWN if owner.is_shared else join(map(_widen, alternatives(stored)))
 
     def _is_changed_inside(self, owner: Instance, name: str, stored: Value) -> bool:
-        holds = any(isinstance(each, Mapping | Sequence) for each in alternatives(stored))
-        return owner.is_shared and holds and self._changes(owner.of, name, stored, is_shared=True)
+        held = [each for each in alternatives(stored) if isinstance(each, Mapping | Sequence)]
+        # It may have other names.
+        names = [
+            other
+            for other, value in owner.attributes.items()
+            if other == name or any(each in (value, *held_by(value)) for each in held)
+        ]
+        return bool(held and owner.is_shared) and any(
+            self._changes(owner.of, each, stored, is_shared=True) for each in names
+        )
 
     def _read_of_proxy(self, owner: Instance, name: str) -> Value:
         """Return what `__getattr__` gives; that there is nothing, is for it to say."""
@@ -256,9 +271,12 @@ class Classes(Part):
             owner.doubtful.add(name)
         owner.set(name, value)
 
+    def _every_store(self, name: str) -> list[AttributeStore]:
+        found: list[AttributeStore] = self._evaluator.run.modules.stores_of(name)
+        return found
+
     def _stores(self, name: str) -> list[AttributeStore]:
-        every: list[AttributeStore] = self._evaluator.run.modules.stores_of(name)
-        return [each for each in every if not each.is_inside]
+        return [each for each in self._every_store(name) if each.inside == NOTHING]
 
     def _changes(self, of: Class, name: str, value: Value, *, is_shared: bool) -> bool:
         """Return whether an attribute may be something else than what was stored in it.
@@ -267,9 +285,12 @@ class Classes(Part):
             is_shared: Whether other behaviours may change what it holds.
         """
         stores = self._stores(name)
-        holds = any(isinstance(each, Mapping | Sequence) for each in alternatives(value))
-        if is_shared and holds:
-            stores = self._evaluator.run.modules.stores_of(name)
+        held = [each for each in alternatives(value) if isinstance(each, Mapping | Sequence)]
+        if is_shared and held:
+            inner = [one for each in held for one in held_by(each)]
+            is_deep = any(isinstance(each, Mapping | Sequence | Instance) for each in inner)
+            stores = self._every_store(name)
+            stores = [each for each in stores if each.inside in (ALL, NOTHING) or is_deep]
         line = [each.definition for each in self.bodies.line_of(of) if isinstance(each, Class)]
         return any(
             each.owner is None or (each.owner in line and not each.is_made) for each in stores

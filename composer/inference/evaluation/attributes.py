@@ -145,6 +145,8 @@ class Attributes(Part):
                 return constant(in_python(owner.type).rpartition('/')[2].rpartition('.')[2])
             if isinstance(owner, NodeValue | PartOfNode):
                 self._evaluator.escape(owner)
+            if isinstance(owner, Mapping | Sequence):
+                return BoundMethod(owner, name)
             # Who asks for a type's module asks which type it is.
             return CHOSEN if isinstance(owner, MessageClass) else UNKNOWN
         match owner:
@@ -171,7 +173,9 @@ class Attributes(Part):
                 return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
             case Super(of=of, owner=Instance() | Class() as mine):
                 whole = mine.of if isinstance(mine, Instance) else mine
-                return self._evaluator.classes.class_attribute(whole, name, mine, of) or UNKNOWN
+                found = self._evaluator.classes.class_attribute(whole, name, mine, of)
+                is_plain = name not in ('__setattr__', '__delattr__')
+                return found or (External(f'builtins.object.{name}') if is_plain else UNKNOWN)
             case ArrayField():
                 return self._read_array(owner, name)
             case Unknown(is_read_only=True) if name in WRITING or name in VIEWING:
@@ -404,6 +408,9 @@ class Attributes(Part):
             case Message():
                 self._store_field(owner, name, value, place)
             case Instance():
+                if owner.is_open:
+                    self._evaluator.escape(value)
+                run.changes += 1
                 self._evaluator.classes.store(owner, name, value)
             case Class():
                 self._evaluator.classes.store_in_class(owner, name, value)

@@ -50,6 +50,8 @@ _CALLING_LATER = {
     **dict.fromkeys(('call_soon', 'call_soon_threadsafe', 'callback', 'submit', 'to_thread'), 0),
     **dict.fromkeys(('call_at', 'call_later', 'run_in_executor'), 1),
 }
+# Functions that reach the variables of who calls them.
+_REACHING_ALL = frozenset({f'builtins.{name}' for name in ('eval', 'exec', 'locals', 'vars')})
 
 
 class Calls(Part):
@@ -57,14 +59,27 @@ class Calls(Part):
 
     def call(self, node: ast.Call, scope: Scope, *, is_awaited: bool = False) -> Value:
         """Return what a call may return."""
-        function = self._evaluator.evaluate(node.func, scope)
+        owner: Value = UNKNOWN
+        if isinstance(node.func, ast.Attribute):
+            owner = self._evaluator.evaluate(node.func.value, scope)
+            at = Place(scope.module, node.func)
+            function = self._evaluator.attributes.read(owner, node.func.attr, at)
+        else:
+            function = self._evaluator.evaluate(node.func, scope)
         arguments = self._arguments(node, scope, function)
+        if any(isinstance(each, Unknown) for each in alternatives(function)):
+            # It may be a method that changes what it is called on.
+            for each in alternatives(owner):
+                if isinstance(each, Instance | Class | Super):
+                    self._evaluator.escape(each)
         place = Place(scope.module, node)
         self._note_keys(function, arguments)
         if function == External('builtins.super'):
             return _super_in(scope)
-        if function == External('builtins.locals'):
-            return UNKNOWN
+        if isinstance(function, External) and function.name in _REACHING_ALL:
+            self._escape_scope(
+                scope if function.name != 'builtins.vars' or not node.args else None
+            )
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ''
         if method in _CALLING_LATER or isinstance(function, External):
             arguments = _with_work(arguments, _CALLING_LATER.get(method))
@@ -84,6 +99,13 @@ class Calls(Part):
             )
         finally:
             self._evaluator.call_places.pop()
+
+    def _escape_scope(self, scope: Scope | None) -> None:
+        """Note that something unknown has all that is around a place."""
+        while scope is not None:
+            for each in list((scope.names or {}).values()):
+                self._evaluator.escape(each)
+            scope = scope.outer
 
     def _fitting(self, function: Value, arguments: Arguments) -> list[Value]:
         """Return which of several functions may be called so, or all if none may."""

@@ -101,6 +101,7 @@ class Containers(Part):
 
     def set_item(self, owner: Mapping, key: object, value: Value, place: Place) -> None:
         """Store an entry of a dictionary."""
+        self._evaluator.run.changes += 1
         owner.set(key, value, place, self._evaluator.run.conditions)
 
     def check_index(self, owner: Value, index: Value, place: Place) -> None:
@@ -118,8 +119,11 @@ class Containers(Part):
 
     def store_item(self, owner: Value, index: Value, value: Value, place: Place) -> None:
         """Store `owner[index] = value`."""
+        self._evaluator.run.changes += 1
         for each in alternatives(owner):
             self.check_index(each, index, place)
+            if getattr(each, 'is_lost', False):
+                self._evaluator.escape(value)
             match each:
                 case Mapping():
                     if isinstance(index, Constant):
@@ -144,6 +148,7 @@ class Containers(Part):
 
     def extend(self, owner: Sequence, value: Value, place: Place) -> None:
         """Add the items of another sequence."""
+        self._evaluator.run.changes += 1
         if isinstance(value, Sequence) and not value.is_lost:
             owner.items += value.items
             owner.is_open |= value.is_open or bool(self._evaluator.run.conditions)

@@ -55,16 +55,21 @@ from composer.inference.values import (
     PartOfNode,
     Place,
     Primitive,
+    ProjectModule,
     Scalar,
     Sequence,
+    Super,
     Unknown,
     Value,
     alternatives,
     constant,
+    held_by,
     is_chosen,
     join,
+    share,
     truth_of,
 )
+from composer.python_source.changed_names import ALL, NOTHING, changed_in
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -158,9 +163,20 @@ class Evaluator:
                 if isinstance(statement, ast.Import | ast.ImportFrom):
                     return self.imports.imported(module, statement, name)
                 self.statements.follow_all([cast('ast.stmt', statement)], scope)
-            return (scope.names or {}).get(name, UNKNOWN)
+            value = (scope.names or {}).get(name, UNKNOWN)
+            self._lose(value, self.run.modules.change_of(module, name))
+            is_fixed = isinstance(value, Function | Class | Instance | ProjectModule)
+            is_stored = self.run.modules.is_stored_anyhow(module, name)
+            return UNKNOWN if is_stored and not is_fixed else value
 
         return self.run.modules.value(module, name, evaluate)
+
+    def _lose(self, value: Value, depth: int) -> None:
+        """Note how deep other code changes what a module holds."""
+        if depth == ALL and isinstance(value, Mapping | Sequence | Instance | Class):
+            self.escape(value)
+        for each in held_by(value) if ALL < depth < NOTHING else ():
+            self._lose(each, depth - 1)
 
     def read_target(self, target: ast.expr, scope: Scope) -> Value:
         """Return what the target of `+=` holds."""
@@ -308,7 +324,7 @@ class Evaluator:
         found = join(map(_lasting, alternatives(value)))
         kept[name] = join([kept[name], found]) if name in kept else found
         if isinstance(value, Instance) and not value.is_member:
-            value.is_shared = True
+            share(value)
             self.kept[name] = join([value, self.kept[name]]) if name in self.kept else value
         else:
             self.escape(value)
@@ -318,41 +334,68 @@ class Evaluator:
         return self.kept[name] if name in self.kept else self.run.facts.kept_value(name)
 
     def escape(self, value: Value) -> None:
-        """Note that something unknown has a value: it may change it, or call it."""
+        """Note that something unknown has a value: it may change it, or call it.
+
+        This holds for all that can be reached from it, too.
+        """
         match value:
-            case Alternatives():
-                for each in value.values:
-                    self.escape(each)
             case NodeValue():
                 self.run.reading.open_all()
             case Constant(value=str(text)):
                 self.run.reading.mentioned.add(text)
-            case PartOfNode(name='parameters'):
-                self.run.reading.open_kinds.add('parameter')
-            case PartOfNode(name='state'):
-                self.run.reading.is_state_open = True
+            case PartOfNode():
+                self._escape_part(value)
             case BoundMethod(owner=owner) if owner in (NODE, PartOfNode('parameters')):
                 self._escape_method(value)
-            case Primitive():
-                value.is_lost = True
             case BoundMethod(owner=Primitive() as owner, name=name):
                 owner.is_lost |= name not in WAITING.get(owner.kind, ())
-            case Mapping() | Sequence() if not value.is_lost:
+            case Primitive():
                 value.is_lost = True
-                held = value.entries.values() if isinstance(value, Mapping) else value.items
-                for each, _ in list(held):
-                    self.escape(each)
-                if isinstance(value, Mapping) and value.others is not None:
-                    self.escape(value.others)
-            case Function() if not value.is_read and value.definition not in self.functions.active:
-                self.functions.follow_later(value)
+            case Mapping() | Sequence() | Instance() | Class():
+                self._escape_object(value)
+            case Function() if value.definition not in self.functions.active:
+                self._escape_function(value)
             case Partial():
                 self.calls.invoke_later(value)
-            case Instance():
-                value.is_open = True
-                for each in value.attributes.values():
-                    if isinstance(each, NodeValue | BoundMethod | PartOfNode):
-                        self.escape(each)
+            case Alternatives() | BoundMethod() | Super() | Generated() | Awaitable():
+                for each in held_by(value):
+                    self.escape(each)
+
+    def _escape_part(self, value: PartOfNode) -> None:
+        reading = self.run.reading
+        reading.open_kinds |= {'parameter'} if value.name == 'parameters' else set()
+        reading.is_state_open |= value.name == 'state'
+        reading.is_own_state_open |= value.name == 'own_state'
+
+    def _escape_object(self, value: Mapping | Sequence | Instance | Class) -> None:
+        is_known = value.is_open if isinstance(value, Instance | Class) else value.is_lost
+        if is_known or (isinstance(value, Instance) and value.is_member):
+            return
+        self.run.changes += 1
+        if isinstance(value, Instance | Class):
+            value.is_open = True
+        else:
+            value.is_lost = not (isinstance(value, Sequence) and value.is_fixed)
+        of = value.of if isinstance(value, Instance) else value
+        if isinstance(of, Class) and of.outer is not None:
+            # Its methods reach what is around it.
+            for name in self.classes.bodies.names_of(of):
+                owner = value if isinstance(value, Instance) else None
+                self.escape(self.classes.class_attribute(of, name, owner) or UNKNOWN)
+        for each in held_by(value):
+            self.escape(each)
+
+    def _escape_function(self, function: Function) -> None:
+        """Read a function that may be called with anything, as often as something likes."""
+        if isinstance(function.owner, Instance):
+            function.owner.is_shared = True
+        if not function.is_read or function.outer is not None:
+            self.functions.follow_later(function)
+        scope = function.outer
+        while scope is not None:
+            for name in scope.local & changed_in(function.definition):
+                self.escape((scope.names or scope.stored).get(name, UNKNOWN))
+            scope = scope.outer
 
     def _escape_method(self, method: BoundMethod) -> None:
         kind = {**SENDING_METHODS, 'get': 'parameter'}.get(method.name)

@@ -296,6 +296,7 @@ class Expressions(Part):
         truth = truth_of(test)
         found: list[Value] = []
         before = scope.copy_names()
+        ends: list[Names | None] = []
         for branch, taken in ((node.body, True), (node.orelse, False)):
             evaluator.narrowing.narrow(node.test, scope, test, is_true=taken)
             with evaluator.branch(test, is_taken=taken):
@@ -304,7 +305,9 @@ class Expressions(Part):
                 found.append(value)
             elif is_chosen(test):
                 evaluator.escape(value)
+            ends.append(scope.names if any(map(_is_walrus, ast.walk(branch))) else before)
             scope.names = None if before is None else dict(before)
+        scope.names = join_names(ends)
         value = join(found)
         if isinstance(value, Alternatives):
             return Alternatives(value.values, is_direct=True)
@@ -404,6 +407,10 @@ class Expressions(Part):
     def _yield(self, node: ast.Yield, scope: Scope) -> Value:
         value = self.evaluate(node.value, scope) if node.value else NONE
         home = self._evaluator.home_of(scope)
+        if len(self._evaluator.functions.active) > 1:
+            # Who goes through it has it meanwhile.
+            held, value = value, self._evaluator.library.mappings.lasting_copy(value)
+            self._evaluator.escape(held)
         home.yielded.append((value, Place(scope.module, node.value or node)))
         return UNKNOWN
 
@@ -418,7 +425,10 @@ class Expressions(Part):
 
     def _namedexpr(self, node: ast.NamedExpr, scope: Scope) -> Value:
         value = self.evaluate(node.value, scope)
-        self._evaluator.home_of(scope).set(node.target.id, value)
+        home = self._evaluator.home_of(scope)
+        before = (home.names or {}).get(node.target.id, UNKNOWN)
+        # A comprehension may have no rounds.
+        home.set(node.target.id, value if home is scope else join([before, value]))
         scope.set(node.target.id, value)
         return value
 
@@ -468,6 +478,10 @@ class Expressions(Part):
                 else:
                     made.set_other(value)
         return made
+
+
+def _is_walrus(node: ast.AST) -> bool:
+    return isinstance(node, ast.NamedExpr)
 
 
 def _is_globals(node: ast.expr) -> bool:

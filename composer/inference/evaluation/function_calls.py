@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from contextlib import nullcontext
 from typing import Any
 
 from composer.inference.evaluation.part import Part
@@ -29,6 +30,7 @@ from composer.inference.values import (
     Value,
     join,
 )
+from composer.python_source.changed_names import changed_in
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource, read_signature
 
@@ -151,9 +153,14 @@ class Functions(Part):
             return AGAIN if is_plain and function.definition in self.active else UNKNOWN
         if not self.fits(function, arguments):
             return UNKNOWN
-        scope = self.enter(function, arguments, waits=waits)
-        result = result_of(self.kind_of(function), scope)
-        if key is not None:
+        run, kind = self._evaluator.run, self.kind_of(function)
+        # Generators and coroutines run later, if at all.
+        is_late = kind.is_generator or (kind is FunctionKind.COROUTINE and not waits)
+        changes = run.changes
+        with run.condition() if is_late else nullcontext():
+            scope = self.enter(function, arguments, waits=waits)
+        result = result_of(kind, scope)
+        if key is not None and run.changes == changes:
             self._results[key] = result
         return result
 
@@ -269,7 +276,11 @@ class Functions(Part):
             if name in named:
                 scope.set(name, named.pop(name).value)
             elif name in defaults and not arguments.is_open:
-                scope.set(name, self._default(function, defaults[name]))
+                value = self._default(function, defaults[name])
+                if name in changed_in(function.definition):
+                    # Each call finds what the calls before it have left.
+                    self._evaluator.escape(value)
+                scope.set(name, value)
             else:
                 scope.set(name, UNKNOWN)
         if parameters.vararg:

@@ -351,7 +351,7 @@ def _is_in(item: Value, container: Value) -> bool | None:
     if isinstance(container, Constant) and isinstance(container.value, str):
         return item.value in container.value if isinstance(item.value, str) else None
     if isinstance(container, Mapping) and not container.is_lost:
-        return True if item.value in container.entries else None if container.is_open else False
+        return None if container.is_open else item.value in container.entries
     if isinstance(container, Sequence) and container.is_whole:
         values = [value for value, _ in container.items]
         if all(isinstance(value, Constant) for value in values):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeGuard
 
-from composer.inference.classes.attribute_stores import CHANGING
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
 from composer.inference.values import (
@@ -20,6 +19,7 @@ from composer.inference.values import (
     alternatives,
     is_none,
 )
+from composer.python_source.changed_names import CHANGING
 
 if TYPE_CHECKING:
     from composer.inference.values import Place

@@ -6,9 +6,9 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.inference.classes.attribute_stores import CHANGING
 from composer.inference.sharing.object_classes import QUEUING
 from composer.inference.sharing.object_resolver import ObjectResolver, is_load
+from composer.python_source.changed_names import CHANGING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from typing import cast
 
 from composer.inference.evaluation.part import Part
@@ -45,7 +45,9 @@ class Guards(Part):
         before = scope.copy_names()
         is_guard, is_broad = any(map(_is_guard, node.handlers)), any(map(_is_broad, node.handlers))
         tried = run.tried
-        with run.guard(is_guard=is_guard, is_broad=is_broad):
+        # It may be left before its end.
+        doubt = run.condition() if node.handlers else nullcontext()
+        with run.guard(is_guard=is_guard, is_broad=is_broad), doubt:
             self._evaluator.statements.follow_all(node.body, scope)
         after = scope.names
         if after is not None:

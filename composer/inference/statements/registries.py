@@ -5,10 +5,10 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from composer.inference.classes.attribute_stores import CHANGING
 from composer.inference.evaluation.part import Part
 from composer.inference.scopes import Scope
 from composer.inference.values import Mapping, Sequence, Value
+from composer.python_source.changed_names import CHANGING
 
 if TYPE_CHECKING:
     from composer.python_source.modules import ModuleSource
@@ -39,7 +39,7 @@ class Registries(Part):
     def _fill(self, module: ModuleSource, name: str, made_by: ast.stmt) -> None:
         """Follow the statements at the top of a module that change a registry."""
         fillers = _fillers(module, name)
-        if fillers is None:
+        if not fillers:
             return
         scope = Scope(module)
         run = self._evaluator.run

@@ -223,7 +223,8 @@ class Computation:
             held = [self._item(each, each) for each in items]
             if isinstance(found, Iterator):
                 values = tuple(value for value, _ in held)
-                return Generated(join(values), NONE, items=values)
+                # Who goes through nothing may find what is stored until then.
+                return Generated(join(values), NONE, items=values or None)
             return Sequence(held, type(found), origin=self._place)
         raise NotKnownError
 

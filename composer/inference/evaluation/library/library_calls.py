@@ -201,6 +201,8 @@ class LibraryCalls(Part):
                 where = name_place(name, each)
                 found.append(self._evaluator.attributes.read(owner.value, each.value, where))
         del place
+        if has_default:
+            self._evaluator.escape(join(found))
         return UNKNOWN if has_default else join(found)
 
     def _setattr(self, arguments: Arguments, place: Place) -> Value:

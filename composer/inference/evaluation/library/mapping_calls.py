@@ -38,7 +38,7 @@ class MappingCalls(Part):
         return {
             'builtins.dict': self._dict,
             'builtins.dict.fromkeys': self._from_keys,
-            'builtins.vars': self._vars,
+            'builtins.vars': self._own_dict,
             'collections.OrderedDict': self._dict,
             'collections.OrderedDict.fromkeys': self._from_keys,
             'collections.ChainMap': self._chain,
@@ -48,7 +48,7 @@ class MappingCalls(Part):
             'copy.replace': self._replace,
             'dataclasses.asdict': self._vars,
             'dataclasses.replace': self._replace,
-            'types.MappingProxyType': self._dict,
+            'types.MappingProxyType': lambda given, _: given.positional[0].value,
         }
 
     def _new(self, *, is_open: bool = False) -> Mapping:
@@ -90,7 +90,9 @@ class MappingCalls(Part):
 
     def _chain(self, arguments: Arguments, place: Place) -> Value:
         """Of the mappings of a `ChainMap`, the first that has a key counts."""
-        return self._dict(Arguments(arguments.positional[::-1], (), arguments.is_open), place)
+        made = self._dict(Arguments(arguments.positional[::-1], (), True), place)
+        self._evaluator.calls.escape_all(arguments)
+        return made
 
     def _default(self, arguments: Arguments, place: Place) -> Value:
         self._evaluator.calls.escape_all(Arguments(arguments.positional[:1]))
@@ -98,6 +100,12 @@ class MappingCalls(Part):
         if isinstance(made, Mapping):
             made.is_open = True
         return made
+
+    def _own_dict(self, arguments: Arguments, place: Place) -> Value:
+        """Return what `vars` gives; who has it may store other attributes."""
+        found = self._vars(arguments, place)
+        self._evaluator.calls.escape_all(arguments)
+        return found
 
     def _vars(self, arguments: Arguments, place: Place) -> Value:
         """Return the attributes of objects; those of others are not known."""
@@ -151,6 +159,11 @@ class MappingCalls(Part):
             case Constant() | Scalar():
                 return value
         return UNKNOWN
+
+    def lasting_copy(self, value: Value) -> Value:
+        """Return containers as they are now; other values stay what they are."""
+        is_container = isinstance(value, Mapping | Sequence)
+        return self.copied(value) if is_container else value
 
     def _replace(self, arguments: Arguments, place: Place) -> Value:
         first = arguments.get(0, '')

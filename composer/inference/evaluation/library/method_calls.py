@@ -24,6 +24,7 @@ from composer.inference.values import (
     is_chosen,
     join,
 )
+from composer.python_source.changed_names import CHANGING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,8 +90,10 @@ class MethodCalls(Part):
         if isinstance(owner, Mapping):
             method = self._of_mappings.get(name)
             if method is not None:
+                self._evaluator.run.changes += name in CHANGING
                 return method(owner, arguments, place)
         if isinstance(owner, Sequence) and name in self._of_sequences:
+            self._evaluator.run.changes += name in CHANGING
             return self._of_sequences[name](owner, arguments, place)
         return self._call_plain(owner, name, arguments, place)
 
@@ -190,7 +193,8 @@ class MethodCalls(Part):
     def _view(
         self, name: str, owner: Mapping, items: list[tuple[Value, Place]], place: Place
     ) -> Value:
-        if owner.is_open:
+        if owner.is_open or not items:
+            # It shows what is stored later, too.
             value = owner.any_value()
             pair = Sequence([(UNKNOWN, place), (value, place)], tuple)
             of_view = {'keys': UNKNOWN, 'values': value, 'items': pair}
