@@ -129,6 +129,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     first: dict[str, NodeSpec | ComponentSpec] = {}
     spec = context.spec
     nodes: list[NodeSpec | ComponentSpec] = [*spec.nodes.values(), *spec.components]
+    named = {name: process for process in spec.processes.values() for name in process.named_nodes}
     for node in nodes:
         other = first.setdefault(node.full_name, node)
         if other is not node and not _are_misplaced(context, node, other):
@@ -138,6 +139,15 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
                 f"a node '{node.full_name}' already exists",
                 help="give one of them another name, or a 'namespace'",
                 related=[Related('the other one', context.system.positions.key(other.path))],
+            )
+        process = named.get(node.full_name)
+        if process is not None and not _are_misplaced(context, node):
+            yield context.at_value(
+                (*process.path, 'name'),
+                'duplicate-node',
+                f"a node '{node.full_name}' already exists",
+                help="give one of them another name, or a 'namespace'",
+                related=[Related('the other one', context.system.positions.key(node.path))],
             )
 
 

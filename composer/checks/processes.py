@@ -172,8 +172,14 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
     program = process.command[0]
     folder = Path(process.cwd or '.')
     is_known = process.cwd is not None and folder.is_dir()
+    at = (*process.path, 'command', 0)
     if '/' in program and not (is_known or Path(program).is_absolute()):
-        # Without `cwd` it is searched from where the system is started.
+        # Without `cwd` it is searched from where the system is started: here, or beside the file.
+        beside = context.system.positions.value(at).source.folder
+        if process.cwd is None and not any((each / program).exists() for each in (folder, beside)):
+            message = f"there is no program '{program}' here, where a system without 'cwd' runs it"
+            help_text = explain_missing(beside / program, beside)
+            yield context.at_value(at, 'missing-program', message, help=help_text)
         return
     variables = {**shell_environment(), **context.spec.environment}
     environment = {**base_environment(variables), **process.env}
@@ -182,5 +188,4 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
     problem = find_program_problem(program, folder, environment)
     if problem:
         message, advice = problem
-        path = (*process.path, 'command', 0)
-        yield context.at_value(path, 'missing-program', message, help=advice)
+        yield context.at_value(at, 'missing-program', message, help=advice)

@@ -157,33 +157,26 @@ def check_types(context: CheckContext) -> Iterator[Diagnostic]:
                 continue
             path = (*entity.path, 'type')
             inner = path if path in context.system.positions.values else entity.path
-            yield _explain_type(context, inner, entity.type)
+            message, part, advice = describe_missing_type(context, entity.type)
+            first = entity.type.startswith(f'{part}/')
+            yield context.at_value(
+                inner, 'unknown-type', message, part=part, first=first, help=advice
+            )
 
 
-def _explain_type(context: CheckContext, path: DataPath, full_name: str) -> Diagnostic:
+def describe_missing_type(context: CheckContext, full_name: str) -> tuple[str, str, str | None]:
+    """Return what is wrong with the name of a type, the part that is wrong, and help."""
     package, kind, name = full_name.split('/')
     packages = context.catalogue.packages()
     if package not in packages:
-        return context.at_value(
-            path,
-            'unknown-type',
-            f"no interface package '{package}' is installed",
-            part=package,
-            first=True,
-            help=explain_missing_package(
-                package, packages, ", or name the folder of its definitions under 'interfaces:'"
-            ),
-        )
+        otherwise = ", or name the folder of its definitions under 'interfaces:'"
+        help_text = explain_missing_package(package, packages, otherwise)
+        return f"no interface package '{package}' is installed", package, help_text
     known = context.catalogue.names(cast('InterfaceKind', kind), package)
     names = [full.rpartition('/')[2] for full in known]
     noun = _KIND_NOUNS[kind]
-    return context.at_value(
-        path,
-        'unknown-type',
-        f"the package '{package}' has no {noun} '{name}'",
-        part=name,
-        help=suggest(name, names, f'its {noun}s are'),
-    )
+    advice = suggest(name, names, f'its {noun}s are')
+    return f"the package '{package}' has no {noun} '{name}'", name, advice
 
 
 def check_start_values(context: CheckContext) -> Iterator[Diagnostic]:

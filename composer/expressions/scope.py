@@ -21,12 +21,14 @@ class Scope:
         samples: The names whose values only stand for others of their type.
         origins: Where the values come from, in words.
         arguments: The names that are arguments of the file.
+        choices: The values that arguments may have, of those that have choices.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
     samples: Collection[str] = frozenset()
     origins: Mapping[str, str] = field(default_factory=dict)
     arguments: Collection[str] = ()
+    choices: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     def within(self, name: str, value: Any, origin: str, *, is_sample: bool) -> Scope:
         """Return the scope with one more name."""

@@ -26,6 +26,7 @@ from jinja2.exceptions import SecurityError
 from composer.confidential import hide, origin_of
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions import ARGUMENTS, written_in_expression
+from composer.expressions.comparisons import find_useless_comparisons
 from composer.expressions.evaluation import UnknownArgumentError, evaluate_expression
 from composer.expressions.functions import PackageError
 from composer.expressions.sandbox import Sandbox
@@ -202,6 +203,13 @@ class TemplateEvaluator:
         if 'here' in self._names_in(text, [expression]):
             scope = {'here': os.path.realpath(span.source.folder), **scope}
         value = _as_data(evaluate_expression(self._sandbox, code, scope))
+        for message, part, advice in find_useless_comparisons(
+            self._sandbox.parse_expression(code), self.scope
+        ):
+            place = span.narrowed_to(part)
+            self.document.diagnostics.append(
+                diagnostic_at(place, 'never-equal', message, help=advice)
+            )
         origin = self._hidden_origin(text, [expression])
         if origin is not None:
             hide(value, origin)

@@ -92,4 +92,6 @@ class NodeFacts:
             value = constant(parameter.value, is_chosen=BY_PARAMETER)
             return value if self.tells_values else Scalar(value.kind, BY_PARAMETER)
         kind = _PYTHON_TYPES.get(parameter.type or '')
-        return Scalar(kind, is_chosen=BY_PARAMETER) if kind else CHOSEN
+        is_set = parameter.value is not None or self.node.has_other_parameters
+        unset = '' if is_set or self.node.parameter_files else name
+        return Scalar(kind, is_chosen=BY_PARAMETER, unset=unset) if kind else CHOSEN

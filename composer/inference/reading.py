@@ -52,6 +52,7 @@ class NodeUse:
         waits: What the behaviour itself waits for, whatever else the file says: the answer, or
             the end of the goal.
         among: The names of which it is one, if one of several is used.
+        is_guess: Whether the running system may give it another name.
         is_change: Whether it is looked for among the changes of `on_parameters`.
     """
 
@@ -65,6 +66,7 @@ class NodeUse:
     waits: Waited = ''
     is_change: bool = False
     among: tuple[str, ...] = ()
+    is_guess: bool = False
 
 
 @record
@@ -76,12 +78,14 @@ class CreatedEntity:
         name: The name by which behaviours use it; `None` for one that is not known.
         channel: The name of its topic or service, as it is given; `None` for any.
         type: The full name of its type; `None` for any.
+        type_place: Where the type is written.
     """
 
     kind: str
     name: str | None
     channel: str | None
     type: str | None
+    type_place: Span | None
 
 
 @record

@@ -6,7 +6,7 @@ be changed, and are the same only if they are one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.records import record
@@ -70,11 +70,16 @@ class Constant:
 
 @record
 class Scalar:
-    """A number, text or the like of a type of Python, as in `float`."""
+    """A number, text or the like of a type of Python, as in `float`.
+
+    Attributes:
+        unset: The parameter that it is, if this is `None` until something sets it.
+    """
 
     kind: type
     is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
+    unset: str = ''
 
 
 @record
@@ -572,6 +577,13 @@ def share(value: Value) -> None:
             pending += held_by(each)
         elif isinstance(each, Alternatives):
             pending += each.values
+
+
+def once_set(value: Value) -> Value:
+    """Return a value where something has asked for `None`."""
+    if isinstance(value, Alternatives):
+        return Alternatives(tuple(map(once_set, value.values)), value.is_direct)
+    return replace(value, unset='') if isinstance(value, Scalar) and value.unset else value
 
 
 def is_none(value: Value) -> bool:

@@ -44,7 +44,10 @@ def test_a_process_that_is_left_out_may_be_of_another_machine(
         ('{command: [own], env: {PATH: bin}}', []),
         ('{command: [sh], env: {PATH: bin}}', ["there is no program 'sh' on the PATH"]),
         ('{command: [ros2, bag, record, -a], env: {PATH: bin}}', []),
-        ('{command: [./not_here_but_where_it_is_started]}', []),
+        (
+            '{command: [./not_here]}',
+            ["there is no program './not_here' here, where a system without 'cwd' runs it"],
+        ),
         ('{command: [./own], cwd: bin}', []),
         ('{command: [./wno], cwd: bin}', ["there is no program 'bin/wno'"]),
         ('{command: [./text], cwd: bin}', ["'bin/text' is not executable"]),

@@ -296,7 +296,7 @@ def test_an_unknown_package_is_an_error_where_it_is_named(check):
 def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
     more = """
         processes:
-          driver: {command: [./driver], parameter_files: [p.yaml]}
+          driver: {command: [sleep], parameter_files: [p.yaml]}
         """
     text = '/some/node: {ros__parameters: {anything: 1, other: }}'
     nodes = '  arm: {parameter_files: [p.yaml]}\n'
@@ -308,7 +308,7 @@ def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
 def test_the_name_of_a_programs_node_is_matched(check):
     more = """
         processes:
-          driver: {command: [./x], name: lidar, namespace: /robot, parameter_files: [p.yaml]}
+          driver: {command: [sleep], name: lidar, namespace: /robot, parameter_files: [p.yaml]}
         """
     text = '/robot/lidar: {ros__parameters: {a: 1}}\n/robot/lidr: {ros__parameters: {a: 1}}\n'
     (line,) = check('  arm: {}\n', more=more, p=text)

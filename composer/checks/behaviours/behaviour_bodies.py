@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, cast
 
 from composer.checks.behaviours.behaviour_functions import is_called_wrongly
 from composer.checks.behaviours.transforms import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
+from composer.checks.references import describe_missing_type
 from composer.diagnostics import Related, diagnostic_at
-from composer.entity_kinds import PUBLISHED
+from composer.entity_kinds import KIND_OF_NOUN, PUBLISHED, TYPE_FOLDERS
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import find_type_problem
-from composer.spelling import find_nearest, is_typo, suggest
+from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
     from composer.inference.reading import Reading, RemoteParameter
+    from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec, ParameterSpec
     from composer.python_source.modules import ModuleSource
@@ -48,6 +51,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
             *_check_own_state(context, readings),
             *_check_remote_parameters(context, node, readings),
             *_check_unpublished(context, readings, used),
+            *_check_created(context, readings),
         ):
             if finding.span is not None:
                 found.setdefault((finding.span, finding.rule), finding)
@@ -111,6 +115,33 @@ def _check_unpublished(
                 'no-effect',
                 f'nothing publishes this: {binding.owner} has no publish:',
                 help="write 'publish:' beside 'behaviour:', or node.publish here",
+                related=[bound_at(context, binding)],
+            )
+
+
+def _check_created(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
+    """Check the types of entities that behaviours create."""
+    for binding, reading in readings if context.catalogue.available else ():
+        for each in reading.created:
+            kind = KIND_OF_NOUN[each.kind].channel
+            if each.type is None or each.type_place is None or kind is None:
+                continue
+            wanted = cast('InterfaceKind', TYPE_FOLDERS[kind])
+            if re.fullmatch(rf'\w+/{wanted}/\w+', each.type) is None:
+                known = context.catalogue.names(wanted)
+                last = re.split(r'\W', each.type)[-1]
+                meant = [name for name in known if name.rpartition('/')[2] == last]
+                message, part = f"'{each.type}' is no {each.kind}'s type", each.type
+                advice = did_you_mean(meant[0] if meant else None, f'write package/{wanted}/Name')
+            elif context.catalogue.has(each.type):
+                continue
+            else:
+                message, part, advice = describe_missing_type(context, each.type)
+            yield diagnostic_at(
+                each.type_place.narrowed_to(part),
+                'unknown-type',
+                message,
+                help=advice,
                 related=[bound_at(context, binding)],
             )
 

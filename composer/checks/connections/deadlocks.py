@@ -60,6 +60,7 @@ class _Wait:
     place: Span
     answering: DataPath
     answering_group: Group | None
+    is_guess: bool
 
     @property
     def path(self) -> DataPath:
@@ -138,6 +139,7 @@ def _wait_of(
         use.place,
         answering=(*server.path, part),
         answering_group=_need(server, use.waits),
+        is_guess=use.is_guess,
     )
 
 
@@ -198,7 +200,7 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
             help_text = f"'{server.name}' has '{key}', and starts after '{wait.node.name}'"
         yield context.at_value(
             wait.path,
-            'service-deadlock',
+            _rule_of([wait]),
             f'{wait} waits for {wait.what}, which answers only {when}',
             help=_HOOK_HELP.get(hook) if is_own else help_text,
             related=_places(context, [wait]),
@@ -275,12 +277,17 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         )
     return context.at_value(
         first.path,
-        'service-deadlock',
+        _rule_of(chain),
         message,
         part=first.binding.behaviour.function,
         help=_help_for(last),
         related=_places(context, chain[:_MOST_SHOWN]),
     )
+
+
+def _rule_of(chain: list[_Wait]) -> str:
+    """Return the rule that waits break; of names that may be others, they may break it."""
+    return 'possible-deadlock' if any(wait.is_guess for wait in chain) else 'service-deadlock'
 
 
 def _places(context: CheckContext, chain: list[_Wait]) -> list[Related]:

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 
 from composer.inference.evaluation.library.known_values import NotKnownError, leaves_of
 from composer.inference.evaluation.part import Part
-from composer.inference.evaluation.signatures import explain_misfit, signature_of
+from composer.inference.evaluation.signatures import (
+    explain_misfit,
+    plainly,
+    signature_of,
+    wrong_types,
+)
 from composer.inference.message_types import in_python
 from composer.inference.reading import SENDING_METHODS
 from composer.inference.values import (
@@ -266,8 +271,10 @@ class Calls(Part):
         signature = signature_of(owner, name)
         misfit = explain_misfit(signature, arguments) if signature else None
         if misfit is None:
+            for argument, problem in wrong_types(signature, arguments) if signature else ():
+                self._evaluator.run.report('bad-call', argument.place, problem)
             return True
-        shown = str(signature)
+        shown = plainly(signature) if signature else ''
         self._evaluator.run.report(
             'bad-call', place, f'{name}{shown} is called with other arguments: {misfit}'
         )

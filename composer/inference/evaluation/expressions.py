@@ -16,6 +16,7 @@ from composer.inference.evaluation.operators import (
     OPERATIONS,
     combine,
     compare,
+    explain_unset,
     is_never_equal,
     negate,
     refuses_time,
@@ -45,6 +46,7 @@ from composer.inference.values import (
     constant,
     is_chosen,
     join,
+    once_set,
     truth_of,
 )
 from composer.python_source.local_names import list_arguments
@@ -191,7 +193,11 @@ class Expressions(Part):
         self, sign: ast.operator | ast.cmpop, left: Value, right: Value, place: Place
     ) -> None:
         """Report values that an operator does not take."""
-        if type(sign) in OPERATIONS:
+        scalars = [each for each in (left, right) if isinstance(each, Scalar)]
+        unset = next((each.unset for each in scalars if each.unset), '')
+        if unset and type(sign) in OPERATIONS:
+            self._evaluator.run.report('no-value', place, *explain_unset(unset))
+        elif type(sign) in OPERATIONS:
             self._evaluator.refuse(place, OPERATIONS[type(sign)], left, right)
         if refuses_time(sign, left, right):
             text = 'a time of rclpy is combined only with durations and other times'
@@ -302,7 +308,7 @@ class Expressions(Part):
             with evaluator.branch(test, is_taken=taken):
                 value = evaluator.evaluate(branch, scope)
             if truth is None or truth == taken:
-                found.append(value)
+                found.append(once_set(value))
             elif is_chosen(test):
                 evaluator.escape(value)
             ends.append(scope.names if any(map(_is_walrus, ast.walk(branch))) else before)

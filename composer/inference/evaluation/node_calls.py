@@ -16,6 +16,7 @@ from composer.inference.reading import (
 )
 from composer.inference.values import (
     BY_PARAMETER,
+    BY_STATE,
     CHOSEN,
     NODE,
     NONE,
@@ -90,9 +91,14 @@ class NodeCalls(Part):
             is_doubt = len(several) > 1 and not isinstance(name.place.node, ast.IfExp)
             with self._evaluator.run.condition(is_doubt=is_doubt):
                 self._evaluator.run.use(
-                    kind, each.value, name_place(name, each), waits=waited, among=among
+                    kind,
+                    each.value,
+                    name_place(name, each),
+                    waits=waited,
+                    among=among,
+                    is_guess=is_chosen(each) in (BY_PARAMETER, BY_STATE),
                 )
-            type_name = self._evaluator.run.facts.type_of(section, each.value)
+            type_name = self._type_of(section, each.value)
             result = self._send(method, type_name, payload, arguments)
             if isinstance(result, PartOfNode):
                 result = PartOfNode(result.name, result.type, each.value)
@@ -100,15 +106,25 @@ class NodeCalls(Part):
         found = join(results)
         return Awaitable(found) if method == 'call_async' else found
 
+    def _type_of(self, section: str, name: str) -> str | None:
+        """Return the type of an entity that is declared, or that a behaviour creates."""
+        facts = self._evaluator.run.facts
+        declared = facts.type_of(section, name)
+        if declared is not None or name in getattr(facts.node, section):
+            return declared
+        several = alternatives(facts.kept_value(f'{section}/{name}'))
+        created = [each.type for each in several if isinstance(each, MessageClass)]
+        return created[0] if len(created) == 1 else None
+
     def _create(self, method: str, arguments: Arguments) -> Value:
         """Note the entity that a call creates, and read its behaviour."""
         run = self._evaluator.run
         noun, position = CREATING_METHODS[method]
         kind = KIND_OF_NOUN[noun]
         of_type = arguments.get(0, 'msg_type') or arguments.get(0, 'srv_type')
-        type_name = None
+        type_name = type_place = None
         if kind.channel and of_type is not None:
-            type_name = _type_named(of_type.value)
+            type_name, type_place = _type_named(of_type.value), span_of(of_type.place)
         channel = arguments.get(1, 'topic') or arguments.get(1, 'srv_name')
         if kind.channel and channel is not None:
             run.decide(channel.value)
@@ -120,7 +136,10 @@ class NodeCalls(Part):
                 texts.append(None)
             for text in texts:
                 for name in names if len(names) == 1 else [None]:
-                    run.reading.created.append(CreatedEntity(noun, name, text, type_name))
+                    made = CreatedEntity(noun, name, text, type_name, type_place)
+                    run.reading.created.append(made)
+                    if name and type_name:
+                        run.reading.kept[f'{kind.section}/{name}'] = MessageClass(type_name)
         behaviour = None if position is None else arguments.get(position, 'behaviour')
         if behaviour is not None:
             given: list[Value] = [NODE]
@@ -319,7 +338,7 @@ def _type_named(value: Value) -> str | None:
     """Return the full name of the interface type that a value is, if that is known."""
     if isinstance(value, MessageClass):
         return value.type
-    known = isinstance(value, Constant) and isinstance(value.value, str)
+    known = isinstance(value, Constant) and isinstance(value.value, str) and not value.is_chosen
     return value.value if known else None  # type: ignore[union-attr]
 
 

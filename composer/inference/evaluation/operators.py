@@ -51,6 +51,8 @@ ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.LShift: operator.lshift,
     ast.RShift: operator.rshift,
 }
+# A value of each type that operators are tried with.
+SAMPLES: dict[type | None, Any] = {bool: True, int: 1, float: 1.0, str: '1', bytes: b'1'}
 _EQUALITIES = (operator.eq, operator.ne)
 _NUMBERS = (bool, int, float)
 _SETS: tuple[type, ...] = (set, frozenset, type({}.keys()))
@@ -80,7 +82,6 @@ _COMPARED = (
 )
 # What makes a large number of two small ones.
 _POWERS = (ast.Pow, ast.LShift)
-_BITS = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
 # Larger numbers and longer texts are not computed.
 _GREATEST = 2**64
 _LONGEST = 200
@@ -197,20 +198,11 @@ def _kind(value: Value) -> type | None:
 def _result(sign: ast.operator, left: type | None, right: type | None) -> type | None:
     if left is str and isinstance(sign, ast.Mod):
         return str
-    if left is None or right is None:
+    try:
+        found = type(ARITHMETIC[type(sign)](SAMPLES[left], SAMPLES[right]))
+    except (KeyError, TypeError):
         return None
-    if left is str and right is str and isinstance(sign, ast.Add):
-        return str
-    if left not in _NUMBERS or right not in _NUMBERS:
-        return None
-    if isinstance(sign, _BITS) and float in (left, right):
-        return None
-    if isinstance(sign, _BITS):
-        is_shift = isinstance(sign, ast.LShift | ast.RShift)
-        return int if int in (left, right) or is_shift else bool
-    if isinstance(sign, ast.Div) or float in (left, right):
-        return float
-    return int
+    return found
 
 
 def negate(sign: ast.unaryop, value: Value) -> Value:
@@ -264,12 +256,18 @@ def type_of(value: Value) -> type | None:
             return value.kind
         case Sequence() | Mapping() if not value.is_lost:
             return dict if isinstance(value, Mapping) else value.kind
-        case Message():
-            return Message
+        case Message() | MessageClass() | PartOfNode():
+            return type(value)
         case ArrayField(is_made=False) if value.type.array != 'fixed' and not value.type.nested:
             is_list = value.type.kind in ('bool', 'byte', 'string', 'wstring')
             return list if is_list else array
     return None
+
+
+def explain_unset(name: str) -> tuple[str, str]:
+    """Return what is wrong with a parameter that has no value yet, and help."""
+    text = f"the parameter '{name}' has no value until something sets it: this may be None"
+    return text, 'give it a default, or ask whether it is None'
 
 
 def type_in_words(value: Value) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.evaluation.library.known_functions import KNOWN_RESULTS
+from composer.inference.evaluation.operators import explain_unset
 from composer.inference.evaluation.part import Part
 from composer.inference.message_types import in_python
 from composer.inference.values import (
@@ -309,6 +310,9 @@ class _Fit:
         match value:
             case Constant():
                 yield from self._tried(lambda: scalar_reader(field_type)(value.value), place, path)
+            case Scalar() if value.unset and _may_hold(field_type.kind, value.kind):
+                text, help_text = explain_unset(value.unset)
+                yield self._misfit('no-value', text, place, path, help_text)
             case Scalar():
                 if not _may_hold(field_type.kind, value.kind):
                     yield self._wrong(field_type, value, place, path)

@@ -266,6 +266,8 @@ class Statements(Part):
         if truth_of(test) is False:
             scope.names = None
             return
+        if is_chosen(test):
+            self._evaluator.run.doubt(is_chosen(test))
         self._evaluator.narrowing.narrow(node.test, scope, test, is_true=True)
 
     # Branches

@@ -120,7 +120,9 @@ class _Computation:
         return self._scope()
 
     def _scope(self) -> Scope:
-        return Scope(self._values, frozenset(self._samples), self._origins, tuple(self._declared))
+        choices = {name: each.choices for name, each in self._declared.items() if each.choices}
+        names = tuple(self._declared)
+        return Scope(self._values, frozenset(self._samples), self._origins, names, choices)
 
     def _in_order(self) -> list[str]:
         """Return the names, each after those that it needs; those in cycles get samples."""

@@ -13,7 +13,7 @@ from composer.reports.text import render_finding
 IDIOMS = Path(__file__).parents[2] / 'data' / 'valid' / 'idioms'
 SYSTEM = """
   rover:
-    parameters: {speed: 1.0, mode: {default: slow, choices: [slow, fast]}}
+    parameters: {speed: 1.0, mode: {default: slow, choices: [slow, fast]}, unset: {type: integer}}
     parameter_services: true
     state: {distance: 0.0}
     publishers:
@@ -40,7 +40,7 @@ def use(node):
     node.call('enable', True)
     node.call('plan', {})
     node.send_goal('count', 3)
-    return node.parameters.speed, node.parameters.mode
+    return node.parameters.speed, node.parameters.mode, node.parameters.unset
 """
 HEAD = """
 import asyncio
@@ -180,6 +180,21 @@ WRONG = {
     'for i in range(m.pose.pose.position.x): print(i)': 'bad-call',
     'for each in m.pose: print(each)': 'bad-call',
     "print(m.child_frame_id['a'])": 'bad-call',
+    "node.logger.info('x', throttle=1)": 'bad-call',
+    "node.logger.warning('x', throttle_duration_sec='1')": 'bad-call',
+    'node.logger.info(m)': 'bad-call',
+    "node.call('enable', True, timeout='5')": 'bad-call',
+    "node.publish({}, 'command')": 'bad-call',
+    "node.create_timer('1.0', use)": 'bad-call',
+    "node.shutdown('bye')": 'bad-call',
+    "node.create_publisher('std_msgs/msg/Strin', 'made')": 'unknown-type',
+    "node.create_publisher('std_msg/msg/String', 'made')": 'unknown-type',
+    "node.create_publisher('std_msgs/String', 'made')": 'unknown-type',
+    "node.create_client('std_srvs/msg/SetBool', 'made')": 'unknown-type',
+    "node.create_publisher(Odometry, 'made'); node.publish('made', {'poze': {}})": 'unknown-field',
+    "node.create_publisher('std_msgs/msg/Int8', 'made'); node.publish('made', 1.5)": 'field-type',
+    "node.publish('level', node.parameters.unset)": 'no-value',
+    'print(node.parameters.unset * 2)': 'no-value',
     'print(m.pose.covariance[36])': 'bad-index',
     'm.pose.covariance[-37] = 1.0': 'bad-index',
     'print((1, 2)[2])': 'bad-index',
@@ -344,6 +359,12 @@ RIGHT = [
     "print(node.get_parameters('camera', ['gain'])['gain'], node.get_parameters('camera', ('gain',)))",
     "values = {'gain': 1.0}; node.set_parameters('camera', values)",
     'async with Keeper(node): pass',
+    "node.publish('level', node.parameters.unset or 1)",
+    "if node.parameters.unset is not None: node.publish('level', node.parameters.unset)",
+    "n = node.parameters.unset\nif n is None: n = 1\nnode.publish('level', n)",
+    "n = node.parameters.unset; node.publish('level', 1 if n is None else n)",
+    "n = node.parameters.unset; assert n is not None; node.publish('level', n)",
+    "node.create_publisher(node.parameters.mode, 'made'); node.publish('made', {'x': 1})",
     'stop = node.shutdown; print(stop)',
     "node.publish('level', round(m.pose.pose.position.x))",
     "node.publish('level', round(m.pose.pose.position.x, None))",

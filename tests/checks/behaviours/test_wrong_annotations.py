@@ -49,7 +49,7 @@ LISTENER = """
         'Int32 | None',
         'Union[Int32, String]',
         'Unknown',
-        'Int32.field',
+        'Int32.data',
         'find()',
     ],
 )

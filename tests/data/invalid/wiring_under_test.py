@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def hear(node: Node, message: String) -> None:
-    node.logger.info(message.data)
+    node.logger.info(f'{message.data}')
 
 
 def answer(node: Node, message: String) -> str:

@@ -10,6 +10,7 @@ from itertools import islice, product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from composer.inference.evaluation.operators import SAMPLES
 from composer.inference.values import (
     NONE,
     ArrayField,
@@ -41,7 +42,6 @@ _BUILDERS: dict[type, Callable[[Any], Any]] = {
 _KEYS: tuple[type, ...] = (type({}.keys()), type({}.values()), type({}.items()))
 
 _CONTAINERS: Any = (*_BUILDERS, *_KEYS, Iterator)
-_SAMPLES: dict[type, Any] = {bool: True, int: 1, float: 1.0, str: '1', bytes: b'1'}
 _CODES = {'float32': 'f', 'float64': 'd'}
 _MOST_TRIED = 4
 _MESSAGE = type('message', (), {})()
@@ -122,8 +122,8 @@ def _sample(value: Value) -> Any:
         NotKnownError: The type is not known.
     """
     match value:
-        case Constant() | Scalar() if value.kind in _SAMPLES and not getattr(value, 'member', 0):
-            return _SAMPLES[value.kind]
+        case Constant() | Scalar() if value.kind in SAMPLES and not getattr(value, 'member', 0):
+            return SAMPLES[value.kind]
         case Scalar() if issubclass(value.kind, BaseException):
             return value.kind()
         case Sequence() if value.items and not value.is_lost and value.kind in _BUILDERS:

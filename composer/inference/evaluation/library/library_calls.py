@@ -313,6 +313,8 @@ def is_instance(value: Value, wanted: Value) -> bool | None:
 
 
 def _is_one_instance(value: Value, wanted: Value) -> bool | None:
+    if isinstance(value, Scalar) and value.unset:
+        return None
     if isinstance(value, Message) and isinstance(wanted, MessageClass):
         # Of two packages with the same type, either may be meant.
         same = value.type.rpartition('/')[2] == wanted.type.rpartition('/')[2]

@@ -1,0 +1,2 @@
+def drive(node):
+    return {'data': node.parameters.limit}
