@@ -63,11 +63,11 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     for value, place in scope.returned:
         with evaluator.run.condition(is_doubt=id(place.node) in scope.doubtful):
             _check(evaluator, returned, value, place)
-    nothing = all(is_none(value) for value, _ in scope.returned)
-    nothing = nothing and not is_generator and not _is_stub(callee.definition)
-    if wire.needs_payload and wire.returned and scope.returned and nothing:
-        _, place = scope.returned[-1]
-        evaluator.payloads.check(wire.returned, NONE, place)
+    if wire.needs_payload and not is_generator and not _is_stub(callee.definition):
+        # Some of the ways through it may give nothing, and others a payload.
+        for place in (place for value, place in scope.returned if is_none(value)):
+            if id(place.node) not in scope.doubtful:
+                evaluator.payloads.check(wire.returned, NONE, place)
 
 
 def _note_unpublished(evaluator: Evaluator, scope: Scope, wire: Wire) -> None:

@@ -230,6 +230,8 @@ class Functions(Part):
             else:
                 self._evaluator.statements.follow_all(definition.body, scope)
                 if scope.names is not None:
+                    if run.doubts:
+                        scope.doubtful.add(id(definition))
                     scope.returned.append((NONE, Place(function.module, definition)))
             for inner in scope.inner:
                 if not inner.is_read:

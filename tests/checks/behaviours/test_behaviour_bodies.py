@@ -576,3 +576,44 @@ def test_a_comment_in_python_silences_a_finding(check):
     assert check(SYSTEM, code, installed=False) == []
     text = code.replace('print(nobody)', "print(nobody, '''\n").replace('name]\n', "name]''')\n")
     assert [rule for _, rule in check(SYSTEM, text, installed=False)] == ['undefined-name']
+
+
+ANSWER = """
+  switch:
+    services:
+      use: {type: std_srvs/srv/SetBool, behaviour: parts:use}
+"""
+GIVES = "return {'success': True}"
+# Ways on which a service may give no response, and the line that says so.
+UNANSWERED = {
+    f'if request.data: {GIVES}': 1,
+    f'if request.data: {GIVES}\n    elif request: print()\n    else: {GIVES}': 1,
+    f'try: {GIVES}\n    except OSError: pass': 1,
+    f'for x in open("x"): {GIVES}': 1,
+    f'while request.data: {GIVES}': 1,
+    f'match request.data:\n        case True: {GIVES}': 1,
+    f'if not request.data: return\n    {GIVES}': 2,
+    f'if request.data: return None\n    {GIVES}': 2,
+    f'with open("x") as file:\n        if file: {GIVES}': 1,
+}
+ANSWERED = (
+    f'if request.data: {GIVES}\n    raise ValueError',
+    f'while True:\n        if request.data: {GIVES}',
+    f'match request.data:\n        case True: {GIVES}\n        case _: {GIVES}',
+    f'try: {GIVES}\n    finally: print()',
+    f'try: x = open("x")\n    except OSError: raise\n    else: {GIVES}',
+    f'with open("x"): {GIVES}',
+    f'if request.data: {GIVES}\n    else: {GIVES}',
+)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(('body', 'line'), UNANSWERED.items(), ids=UNANSWERED)
+def test_a_way_without_a_response_is_found(check, body, line):
+    assert check(ANSWER, f'def use(node, request):\n    {body}\n') == [(line, 'field-type')]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('body', ANSWERED)
+def test_a_response_on_all_ways_has_no_finding(check, body):
+    assert check(ANSWER, f'def use(node, request):\n    {body}\n') == []
