@@ -308,6 +308,9 @@ class Attributes(Part):
             message = f'{in_python(owner.type)} is a message, and has no items'
             run.report('unknown-field', place, message, f'write .{name}')
             return UNKNOWN
+        if owner == PartOfNode('state'):
+            self.refuse_item(index, place)
+            return UNKNOWN
         if isinstance(owner, PartOfNode) and owner.name == 'own_state':
             if isinstance(index, Constant):
                 run.use_own_state(str(index.value), name_place(Argument(index, place), index))
@@ -424,6 +427,14 @@ class Attributes(Part):
             f"this does not set the parameter '{name}'",
             f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?',
         )
+
+    def refuse_item(self, index: Value, place: Place) -> None:
+        """Report `node.state['x']`."""
+        name = index.value if isinstance(index, Constant) else '…'
+        is_name = isinstance(name, str) and (name.isidentifier() or name == '…')
+        help_text = f'write node.state.{name}' if is_name else 'write node.own_state[…]'
+        message = "the node's state has attributes, and no items"
+        self._evaluator.run.report('unknown-attribute', place, message, help_text)
 
     def store_item(self, index: Value, place: Place) -> None:
         """Refuse `node.parameters['x'] = …`."""

@@ -136,6 +136,8 @@ class Containers(Part):
                     each.is_open = True
                 case PartOfNode(name='parameters'):
                     self._evaluator.attributes.store_item(index, place)
+                case PartOfNode(name='state'):
+                    self._evaluator.attributes.refuse_item(index, place)
                 case PartOfNode(name='own_state'):
                     keys = [key for key in alternatives(index) if isinstance(key, Constant)]
                     reading = self._evaluator.run.reading

@@ -112,6 +112,9 @@ def odometry(node):
 """
 WRONG = {
     # names, however they are reached
+    "print(node.state['distance'])": 'unknown-attribute',
+    "node.state['distance'] = 1.0": 'unknown-attribute',
+    "node.state['distance'] += 1.0": 'unknown-attribute',
     "if m.pose: node.publish('comand', {})": 'unknown-publisher',
     "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})": 'unknown-publisher',
     "ok = m.pose and node.publish('comand', {})": 'unknown-publisher',
