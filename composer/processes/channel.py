@@ -125,6 +125,7 @@ class Channel:
                 while rest:
                     rest = rest[os.write(self._socket.fileno(), rest) :]
                 return
+        self._is_lost = True
         self._on_lost()
 
     def _listen(self) -> None:

@@ -7,6 +7,8 @@ behaviour that holds the interpreter nor an output that nobody reads can block i
   whatever holds the interpreter, and a byte for what Composer does itself (`BEGUN` ...).
 - If a stop takes longer than it may, or more signals come and nothing happens, the guardian has
   Composer print its stacks and end with exit code 1.
+- Composer sends it a byte about once a second, too. When none has come for some time, the guardian
+  reports that, with the stacks. It also reports that a behaviour has closed the pipe.
 - When Composer has ended, however that happened, it kills all processes that bear its mark:
   those that behaviours have started and left.
 
@@ -28,13 +30,17 @@ RLIMIT_LOCKS = 10
 # Prints the stacks of Composer's threads.
 STACKS_SIGNAL = signal.SIGRTMAX
 # What Composer sends, beside the numbers of signals: a stop has begun or is over, or the process
-# goes on without the guardian. `LIMIT` is followed by the seconds that a stop may take.
-BEGUN, OVER, LEAVE, LIMIT = 101, 102, 103, 104
+# goes on without the guardian. `LIMIT` is followed by the seconds that a stop may take. `BEAT`
+# comes about once a second; `PAUSE` comes instead when its absence would mean nothing.
+BEGUN, OVER, LEAVE, LIMIT, BEAT, PAUSE = 101, 102, 103, 104, 105, 106
 SECONDS = struct.Struct('=d')
 # A second one means that the user does not want to wait.
 _INTERRUPTS = {signal.SIGINT, signal.SIGTERM}
 
 _HURRY_SEC = 1.0
+# How often it is looked whether a beat has come, and after how many looks without it that is told.
+_LOOK_SEC = 1.0
+_SILENT_LOOKS = 5
 # How long a process that ends may take from its last descriptor to its end.
 _CLOSING_SEC = 0.5
 # How long the threads of Composer get to print their stacks, and the process to end.
@@ -72,6 +78,8 @@ class Guardian:
         self._interrupts = 0
         self._has_left = False
         self._unread = b''
+        self._silent_looks: float = _NEVER
+        self._told_silence = False
 
     def run(self) -> bool:
         """Return whether Composer has ended; it may have sent the guardian away before."""
@@ -83,13 +91,19 @@ class Guardian:
             if rest <= 0:
                 self._end_composer()
                 return True
-            ready = {each for each, _ in poll.poll(None if rest == _NEVER else rest * 1000 + 1)}
+            ready = {each for each, _ in poll.poll(min(rest, _LOOK_SEC) * 1000 + 1)}
+            if not ready:
+                self._note_silence()
             if self._reports in ready:
                 data = os.read(self._reports, _CHUNK)
                 if not data:
                     poll.unregister(self._reports)
                 if not data and not self._wait(_CLOSING_SEC):
-                    # It has not ended: a behaviour has closed the descriptors of Composer.
+                    # It has not ended.
+                    tell(
+                        '[ERROR] [composer]: the system ends, because a behaviour has closed '
+                        'descriptors that are not its own'
+                    )
                     self._take(BEGUN)
                     # Not counted if the system stops already.
                     self._signal(signal.SIGHUP)
@@ -99,7 +113,7 @@ class Guardian:
                 if self._deadline == _NEVER:
                     tell(
                         '[FATAL] [composer]: the process ended without a stop: it crashed or was '
-                        'killed, or a behaviour called os._exit'
+                        'killed, or a behaviour called os._exit or closed all descriptors'
                     )
                 return True
         return False
@@ -129,6 +143,33 @@ class Guardian:
             self._deadline = now + self._exit_sec
         elif byte == LEAVE:
             self._has_left = True
+        elif byte in {BEAT, PAUSE}:
+            self._silent_looks = 0 if byte == BEAT else _NEVER
+            if self._told_silence:
+                tell('[INFO] [composer]: the system answers again')
+            self._told_silence = False
+
+    def _note_silence(self) -> None:
+        # Looks are counted, not seconds: this process is suspended with the computer, too.
+        if self._deadline < _NEVER or self._is_stopped():
+            return
+        self._silent_looks += 1
+        # An output that nobody reads blocks Composer, too, and would block the stacks.
+        if self._silent_looks == _SILENT_LOOKS and tell(
+            f'[ERROR] [composer]: the system has not answered for {_SILENT_LOOKS * _LOOK_SEC:g} s:'
+            ' a behaviour keeps the interpreter from all others; its threads are at'
+        ):
+            self._told_silence = True
+            self._signal(STACKS_SIGNAL)
+
+    def _is_stopped(self) -> bool:
+        """Return whether Composer was stopped by a signal, or by a debugger."""
+        facts = Path(f'/proc/self/fdinfo/{self._ended}').read_text()
+        pid = facts.partition('Pid:')[2].split()[0]
+        try:
+            return _read_state(Path('/proc', pid)) in {b'T', b't'}
+        except OSError:
+            return False  # It has ended.
 
     def _end_composer(self) -> None:
         tell(
@@ -149,11 +190,12 @@ class Guardian:
         return bool(select.select([self._ended], [], [], timeout_sec)[0])
 
 
-def tell(line: str) -> None:
-    """Print a line, unless that would block."""
+def tell(line: str) -> bool:
+    """Print a line, unless that would block; return whether it was printed."""
     with contextlib.suppress(OSError, ValueError):
         if select.select([], [2], [], 0)[1]:
-            os.write(2, line.encode(errors='backslashreplace') + b'\n')
+            return os.write(2, line.encode(errors='backslashreplace') + b'\n') > 0
+    return False
 
 
 def find_marked(mark: int) -> dict[int, str]:
@@ -166,7 +208,7 @@ def find_marked(mark: int) -> dict[int, str]:
             if int(name) == os.getpid() or _read_mark(folder) != mark:
                 continue
             command = (folder / 'cmdline').read_bytes()
-            if not _is_dead(folder) and _SPARED not in command:
+            if _read_state(folder) not in {b'Z', b'X'} and _SPARED not in command:
                 found[int(name)] = _describe(command)
     return found
 
@@ -184,8 +226,8 @@ def _read_mark(folder: Path) -> int:
     return int(rest.split()[0])
 
 
-def _is_dead(folder: Path) -> bool:
-    return (folder / 'stat').read_bytes().rpartition(b')')[2].split()[0] in {b'Z', b'X'}
+def _read_state(folder: Path) -> bytes:
+    return (folder / 'stat').read_bytes().rpartition(b')')[2].split()[0]
 
 
 def kill_marked(mark: int, whose: str = 'the system') -> None:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _SIGEV_THREAD = 2
 _MARK_BYTES = 7
 _POLL_SEC = 0.02
+_BEAT_SEC = 1.0
 _GONE_SEC = 2.0
 
 
@@ -47,6 +48,7 @@ class GuardianClient:
         self.mark = 0
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._inode = os.fstat(self.descriptor).st_ino
+        self._beat = 0.0
         switch = _create_switch()
         print_stacks_at_signal()
         mark = _create_mark() if owns_process else 0
@@ -73,6 +75,13 @@ class GuardianClient:
     def allow(self, stop_sec: float) -> None:
         """Let a stop take so long from now on."""
         self._send(guardian.LIMIT, guardian.SECONDS.pack(stop_sec))
+
+    def beat(self) -> None:
+        """Tell that Python code runs; called often, it does so once a second."""
+        if (now := monotonic()) - self._beat >= _BEAT_SEC:
+            self._beat = now
+            # A debugger of IDEs stops the thread that calls this, too.
+            self._send(guardian.PAUSE if 'pydevd' in sys.modules else guardian.BEAT)
 
     def begin_stop(self) -> bool:
         """Let the time of a stop run; return whether the guardian can be told."""
@@ -124,6 +133,9 @@ class NoGuardian:
         self.owns_process = owns_process
 
     def allow(self, _stop_sec: float) -> None:
+        """Do nothing."""
+
+    def beat(self) -> None:
         """Do nothing."""
 
     def begin_stop(self) -> bool:

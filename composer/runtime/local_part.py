@@ -135,7 +135,7 @@ class LocalPart:
         self._stop_request.kill_processes = self._kill_processes
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
-        self._hang_watcher = HangWatcher(self._nodes, spec, self._executor.errors)
+        self._hang_watcher = HangWatcher(self._nodes, spec, self._executor.errors, guardian.beat)
         self._control = ControlNode(
             self, spec, self._handle.health, self._hang_watcher, commands, worker
         )
@@ -196,6 +196,7 @@ class LocalPart:
             self._create_nodes()
         self._wait_for_clients(clients)
         self._executor.start()
+        self._guardian.beat()
         self._hang_watcher.start()
         self._graph_watcher.start()
         self._parameter_services.start()
@@ -374,17 +375,22 @@ class LocalPart:
             run, and only the end of this process ends them.
         """
         self.state.is_stopping = True
-        is_guarded = self._guardian.begin_stop()
-        if not is_guarded:
-            self._on_broken('The descriptor of the guardian was closed.')
+        is_guarded = self._is_guarded()
         try:
-            # Without its sockets, which are closed then, too, the middleware would not end.
-            self.has_ended = self._stop() and is_guarded
+            # Without its sockets, which are closed then, too, the middleware would not end. An
+            # `on_stop` may have closed them.
+            self.has_ended = self._stop() and is_guarded and self._is_guarded()
         except BaseException as error:  # noqa: BLE001 - the process must end, whatever is broken
             self._stop_request.set_code(ExitCode.FAILED)
             with suppress(BaseException):
                 system_logger.error(f'the stop failed: {format_internal_error(error)}')
         return self._stop_request.code, self.has_ended
+
+    def _is_guarded(self) -> bool:
+        if self._guardian.begin_stop():
+            return True
+        self._on_broken('The descriptor of the guardian was closed.')
+        return False
 
     def _stop(self) -> bool:
         """Stop everything; return whether all behaviours have ended."""

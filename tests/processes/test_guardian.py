@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import threading
 from pathlib import Path
 
 import pytest
@@ -124,6 +125,42 @@ def test_a_stop_may_take_as_long_as_was_told_last(capfd):
         os.write(descriptor, told[4:] + bytes([guardian.BEGUN]))
         assert watching.run()
     assert 'the system did not end in time' in capfd.readouterr().err
+
+
+def test_silence_is_reported_unless_the_process_is_stopped(capfd, monkeypatch, wait_for):
+    monkeypatch.setattr(guardian, '_LOOK_SEC', 0.01)
+    looks, read_state = [], guardian._read_state
+
+    def note_look(folder):
+        looks.append(read_state(folder))
+        return looks[-1]
+
+    monkeypatch.setattr(guardian, '_read_state', note_look)
+    with subprocess.Popen(['sleep', '1000']) as process:
+        process.send_signal(signal.SIGSTOP)
+        wait_for(lambda: read_state(Path(f'/proc/{process.pid}')) == b'T', 'its stop')
+        reports, descriptor = os.pipe()
+        os.write(descriptor, bytes([guardian.BEAT]))
+        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, descriptor, 1.0, 1.0)
+        thread = threading.Thread(target=watching.run)
+        thread.start()
+        wait_for(lambda: len(looks) > 2 * guardian._SILENT_LOOKS, 'looks at it')
+        assert capfd.readouterr().err == ''
+        # The signal that has Composer print its stacks ends this process.
+        process.send_signal(signal.SIGCONT)
+        thread.join(DEADLINE_SEC)
+    assert ' a behaviour keeps the interpreter from all others' in capfd.readouterr().err
+
+
+def test_a_call_that_holds_the_interpreter_is_reported(compose):
+    code = CODE.replace('sleep(1000)', "sleep(8)\n    node.logger.info('went on')")
+    child = compose(STARTING.format(5, 'parts:hold_interpreter'), code)
+    child.wait_for_line('went on')
+    told = ('not answered for 5 s', 'in hold_interpreter', 'went on')
+    places = [next(n for n, line in enumerate(child.lines) if each in line) for each in told]
+    assert places == sorted(places)
+    child.wait_for_line('[INFO] [composer]: the system answers again')
+    assert child.stop() == 0
 
 
 def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):

@@ -1,5 +1,7 @@
 """A behaviour that breaks what all share: the log says which one ran, and the system ends."""
 
+import signal
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -29,6 +31,9 @@ def replace(node, kind):
 
 def close_all(node):
     os.closerange(3, 4096)
+
+def close_streams_too(node):
+    os.closerange(0, 4096)
 
 def replace_builtin(node):
     builtins.len = None
@@ -74,6 +79,19 @@ def test_the_system_ends_and_names_the_behaviours_that_ran_last(compose, behavio
     report = next(n for n, line in enumerate(child.lines) if 'the system is broken' in line)
     assert "  node 'bad': timer 'hurt', " in child.lines[report + 1]
     assert child.matching('[good]: stopped, 3')
+
+
+@pytest.mark.parametrize('hook', ['on_start', 'on_stop'])
+def test_the_guardian_tells_where_the_process_cannot(compose, hook):
+    child = compose(f"version: 1\nnodes: {{n: {{{hook}: 'parts:close_streams_too'}}}}\n", CODE)
+    if hook == 'on_stop':
+        child.wait_until_ready()
+        child.send(signal.SIGINT)
+
+    assert child.wait() == 1
+    # It may end before the guardian sees that it has not.
+    told = child.matching('[composer]: ')[-1]
+    assert 'closed descriptors' in told or 'closed all descriptors' in told
 
 
 def test_a_process_that_ends_without_a_stop_is_reported(compose):

@@ -123,6 +123,7 @@ class HangWatcher(Watcher):
     Args:
         nodes: By their full names.
         errors: Logs the errors outside all behaviours.
+        beat: Called at each check: who waits for it in vain knows that no Python code runs.
     """
 
     def __init__(
@@ -130,10 +131,12 @@ class HangWatcher(Watcher):
         nodes: Mapping[str, WatchedNode],
         spec: SystemSpec,
         errors: ErrorReporter,
+        beat: Callable[[], None],
     ) -> None:
         super().__init__('composer-watch', self._check_calls, _LONGEST_PAUSE_SEC)
         self._nodes = nodes
         self._errors = errors
+        self._beat = beat
         self.follow(spec)
 
     def follow(self, spec: SystemSpec) -> None:
@@ -161,6 +164,7 @@ class HangWatcher(Watcher):
         ]
 
     def _check_calls(self) -> None:
+        self._beat()
         for node in list(self._nodes.values()):
             for token, entry in list(node.running.entries.items()):
                 if entry is not None and (limit := node.limits.get(entry[0])) is not None:
