@@ -19,7 +19,7 @@ class Outcome:
         time_ns: When the step was done, in virtual time since the start.
         end_ns: When it was answered, refused or given up; `None` if the case ended before.
         answer: The response of a service, or the result of a goal, as messages; `None` if there
-            is none.
+            is none. Of parameters, those that are set, in words.
         status: How a goal ended: `succeeded`, `aborted`, `canceled` or `rejected`; `None` if the
             case ended before.
         feedback: The feedback messages of a goal.

@@ -151,7 +151,7 @@ class SetParametersStepSpec:
     Attributes:
         values: By full names of nodes, then by names of parameters.
         atomically: Whether a node sets all of its values or none.
-        refused: Whether the nodes must refuse them.
+        refused: Whether the nodes must refuse each of them.
     """
 
     schedule: ScheduleSpec

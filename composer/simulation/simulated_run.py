@@ -148,7 +148,7 @@ def observed_log(observe: Observe, *, is_shown: bool) -> Iterator[None]:
             if int(severity) <= _INFO:
                 return  # It counts the node of the scenario.
         node = f'/{name.replace(".", "/")}' if name else ''
-        observe('log', node, _LEVELS.get(int(severity), str(severity)), text)
+        observe('log', node, _LEVELS.get(int(severity), str(severity)), str(text))
         if is_shown:
             log(severity, name, text, *place)
 

@@ -11,7 +11,9 @@ SYSTEM = """
     args: {speed: {default: 1.0}, shout: {default: false}}
     nodes:
       driver:
-        parameters: {speed: "{{ speed }}"}
+        parameters: {speed: "{{ speed }}", other: 0}
+        on_start: parts:begin
+        on_parameters: parts:validate
         state: {heard: []}
         publishers: {out: {type: std_msgs/msg/Float64, external: true}}
         subscriptions:
@@ -21,6 +23,13 @@ SYSTEM = """
 """
 CODE = """
     import time
+
+    def begin(node):
+        if node.parameters.speed > 100:
+            raise OSError('no device')
+
+    def validate(node, changes):
+        return 'too fast' if changes.get('speed', 0) > 100 else None
 
     def react(node, message):
         if message.data < 0:
@@ -98,7 +107,7 @@ DRIVING = """
 
     import parts
     import pytest
-    from composer.errors import ComposerError, UsageError
+    from composer.errors import ComposerError, StartError, UsageError
 
 
     def test_it_drives_in_virtual_time(composer):
@@ -163,6 +172,19 @@ DRIVING = """
         system.forward(0.1)
         (error,) = system.errors
         assert 'negative' in error.value
+
+
+    def test_a_system_that_refuses_to_start(composer):
+        with pytest.raises(StartError, match='no device'):
+            composer('configs/car.yaml', speed=200.0)
+
+
+    @pytest.mark.parametrize('atomically', [True, False])
+    def test_parameters_are_set_each_or_all(composer, atomically):
+        system = composer('configs/car.yaml')
+        with pytest.raises(ComposerError, match='too fast'):
+            system.set_parameters('driver', {'speed': 200.0, 'other': 1}, atomically=atomically)
+        assert system.parameters('driver')['other'] == int(not atomically)
 """
 FAILING = """
     def test_that_fails(composer):
@@ -180,7 +202,7 @@ FAILING = """
 
 
 def test_tests_in_python_drive_systems(run):
-    run(**{'test_car.py': DRIVING}).assert_outcomes(passed=8)
+    run(**{'test_car.py': DRIVING}).assert_outcomes(passed=11)
 
 
 def test_other_plugins_work_with_it(run):

@@ -68,7 +68,7 @@ def test_the_finding_is_what_is_shown(monkeypatch):
     monkeypatch.chdir(ROOT)
     text = (
         'version: 1\nsystem: {file: ../configs/robot.yaml}\ncases:\n  one:\n    when:\n'
-        '      - {at: 1.0, publish: /robot/cmd_vle}\n    then: []\n    until: 2\n'
+        '      - {at: 1.0, publish: /robot/cmd_vle}\n    then: [{exit_code: 0}]\n    until: 2\n'
     )
     loaded = load_scenarios(Path('tests/robot.scenario.yaml'), text=text.encode())
     (found,) = check_scenarios(loaded, InterfaceCatalogue())

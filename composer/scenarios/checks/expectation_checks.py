@@ -28,6 +28,7 @@ from composer.scenarios.specs import (
     MessageExpectationSpec,
     OrderExpectationSpec,
     ParametersExpectationSpec,
+    PublishStepSpec,
     RateExpectationSpec,
     StateExpectationSpec,
 )
@@ -44,11 +45,23 @@ _CONDITIONS = ('where', 'never', 'eventually')
 
 
 def check_expectations(context: ScenarioContext, case: CaseSpec) -> Iterator[Diagnostic]:
-    """Check each expectation against the system."""
+    """Check that something is expected, and each expectation against the system."""
+    if not value_at(context, (*case.path, 'then')) and _only_publishes(case):
+        yield context.at_value(
+            (*case.path, 'then'),
+            'nothing-expected',
+            'this case expects nothing, and passes whatever happens',
+            help="write what it shows, or {error: '*', never: true}",
+        )
     for expected in case.expectations:
         check = _CHECKS.get(type(expected))
         if check is not None:
             yield from check(context, case, expected)
+
+
+def _only_publishes(case: CaseSpec) -> bool:
+    """Return whether no step of a case must have an outcome."""
+    return all(isinstance(each, PublishStepSpec) for each in case.steps)
 
 
 def _check_topic(

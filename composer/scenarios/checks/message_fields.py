@@ -150,7 +150,10 @@ def check_condition(
 
     # Of a message that is not known, the form of the expression can still be wrong.
     heard = description or MessageDescription('unknown', ())
-    findings, _ = evaluate_over(code, heard, context.catalogue)
+    findings, value = evaluate_over(code, heard, context.catalogue)
+    if value is not None and value.is_constant:
+        message = 'this is the same for every message'
+        yield context.at_value(path, 'nothing-expected', message, help='name a field')
     for each in findings:
         if description is not None or each.rule == 'bad-expression':
             yield context.at_value(path, each.rule, each.message, part=each.part, help=each.help)

@@ -23,7 +23,7 @@ _WINDOWS = ('within', 'between')
 
 def check_times(context: ScenarioContext, case: CaseSpec) -> Iterator[Diagnostic]:
     """Check the times of steps and expectations against each other, and the end of the case."""
-    if not case.until_ns:
+    if value_at(context, (*case.path, 'until')) is value_at(context, ('until',)) is None:
         return
     for step in case.steps:
         yield from _check_step(context, case, step)

@@ -14,7 +14,7 @@ from composer.scenarios.expectations.log_expectations import (
     check_unexpected_exit,
 )
 from composer.scenarios.expectations.node_expectations import check_parameters, check_state
-from composer.scenarios.expectations.step_expectations import check_outcome
+from composer.scenarios.expectations.step_expectations import check_outcome, check_undone
 from composer.scenarios.expectations.topic_expectations import (
     check_messages,
     check_order,
@@ -72,6 +72,7 @@ def evaluate(
     failures = [*check_unexpected_errors(case, happened), *check_unexpected_exit(case, happened)]
     for outcome in outcomes:
         failures += check_outcome(outcome)
+    failures += check_undone(case, happened)
     for expected in case.expectations:
         failures += _CHECKS[type(expected)](expected, happened)
     return failures

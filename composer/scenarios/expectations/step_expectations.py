@@ -18,13 +18,24 @@ from composer.scenarios.specs import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from composer.scenarios.expectations.happenings import Happenings
     from composer.scenarios.outcomes import Outcome
+    from composer.scenarios.specs import CaseSpec
     from composer.yaml_text.positions import DataPath
 
 
 def check_outcome(outcome: Outcome) -> Iterator[Failure]:
     """Check what came of a step."""
     yield from _CHECKS[type(outcome.step)](outcome.step, outcome)
+
+
+def check_undone(case: CaseSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check that a system that ends by itself has not ended before a step."""
+    for event in happened.of_kind('exit')[:1]:
+        for step in case.steps:
+            if event.time_ns < step.schedule.at_ns <= case.until_ns:
+                message = f'the step{at_time(step.schedule.at_ns)} is not done: the system ended'
+                yield Failure(step.path, f'{message}{at_time(event.time_ns)}', '', event.time_ns)
 
 
 def _check_publish(step: PublishStepSpec, outcome: Outcome) -> Iterator[Failure]:
@@ -92,8 +103,9 @@ def _check_feedback(step: GoalStepSpec, outcome: Outcome) -> Iterator[Failure]:
 def _check_parameters(step: SetParametersStepSpec, outcome: Outcome) -> Iterator[Failure]:
     nodes = tuple(step.values)
     listed = ', '.join(nodes)
-    if step.refused and outcome.problem is None:
+    if step.refused and outcome.answer:
         message = f'expected {listed} to refuse the parameters{at_time(outcome.time_ns)}'
+        message += f', but {" and ".join(outcome.answer)} can be set'
         yield Failure((*step.path, 'refused'), message, '', outcome.time_ns, nodes)
     elif not step.refused and outcome.problem is not None:
         yield _failure(

@@ -144,6 +144,7 @@ class _CaseRun:
     def _note_refusal(self, error: StartError) -> None:
         """Note that the system has refused to start, by an error of a behaviour or its own."""
         events, system = self.simulated.events, self.simulated.system
+        self.simulated_sec = self.simulated.now
         time_ns = round(self.simulated.now * NANOSECONDS)
         nodes = system.spec.nodes.values() if system.spec else ()
         if not any(event.kind == 'error' for event in events):

@@ -128,13 +128,18 @@ class CaseSteps:
         )
 
     def _set_parameters(self, step: SetParametersStepSpec, time_ns: int) -> Outcome:
-        problem = None
+        was_set, refusals = [], []
         for node, values in step.values.items():
-            try:
-                self._simulated.set_parameters(node, dict(values), atomically=step.atomically)
-            except ParametersRefusedError as error:
-                problem = problem or str(error)
-        return Outcome(step, time_ns, self._now_ns(), problem=problem)
+            each_alone = [{name: value} for name, value in values.items()]
+            for together in [dict(values)] if step.atomically else each_alone:
+                try:
+                    self._simulated.set_parameters(node, together, atomically=step.atomically)
+                    was_set += [f"'{name}' of {node}" for name in together]
+                except ParametersRefusedError as error:
+                    refusals.append(str(error))
+        return Outcome(
+            step, time_ns, self._now_ns(), answer=was_set, problem='; '.join(refusals) or None
+        )
 
     def _now_ns(self) -> int:
         return round(self._simulated.now * NANOSECONDS)

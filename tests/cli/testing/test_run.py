@@ -155,7 +155,9 @@ def processes_of(pid):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_ends_all_and_leaves_nothing_behind(project, wait_for, number, tmp_path):
-    project.scenario('blocks: {given: {parameters: {worker: {mode: blocks}}}, then: []}')
+    project.scenario(
+        'blocks: {given: {parameters: {worker: {mode: blocks}}}, then: [{exit_code: 0}]}'
+    )
     temporary = tmp_path / 'temporary'
     temporary.mkdir()
     process = subprocess.Popen(

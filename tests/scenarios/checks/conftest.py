@@ -103,4 +103,4 @@ def check_case(check):
     return check_case
 
 
-DEFAULTS = {'given': '{}', 'when': '', 'then': ''}
+DEFAULTS = {'given': '{}', 'when': '', 'then': '{error: "*", never: true}'}

@@ -25,6 +25,8 @@ RIGHT = [
     {'then': '{topic: /speed, message: {linear: {x: 1}}, count: [1, 2]}'},
     {'then': '{topic: /scan}', 'when': '{publish: /scan}'},
     {'then': '{topic: /rosout, never: true}'},
+    *({'when': step, 'then': ''} for step in (
+        '{call: /reset}', '{send_goal: /count}', '{set_parameters: {robot: {limit: 2}}}')),
     {'then': '{order: [{topic: speed}, {topic: /speed, where: "linear.x > 0"}]}'},
     {'then': '{log: robot, level: error, never: true}, {log: "*", matches: "a+"}, {error: /lab/robot}'},
     {'then': '{parameters: {robot: {limit: 1}}}, {state: {driver: active}, at: 3}, {exit_code: 0}'},
@@ -131,6 +133,17 @@ WRONG = [
      "(write what the lines have in them, under 'text')"),
     ({'then': '{log: robot, matches: "("}'}, '"(" bad-value: this is no regular expression: '
      'missing ), unterminated subpattern at position 0'),
+    # What holds whatever happens.
+    *(({**given, 'then': ''}, "[ nothing-expected: this case expects nothing, and passes whatever "
+       "happens (write what it shows, or {error: '*', never: true})")
+      for given in ({}, {'when': '{publish: /scan}'}, {'given': '{services: {/dock: {}}}'})),
+    ({'then': '{topic: /speed, never: "false"}'},
+     '"false" nothing-expected: this is the same for every message (name a field)'),
+    ({'then': '{parameters: {robot: {}}}'}, '{ out-of-range: expected at least 1 key, got an empty mapping'),
+    ({'then': '{parameters: {}}'}, '{ out-of-range: expected at least 1 key, got an empty mapping'),
+    ({'then': '{state: {}}'}, '{ out-of-range: expected at least 1 key, got an empty mapping'),
+    ({'when': '{set_parameters: {robot: {}}}'}, '{ out-of-range: expected at least 1 key, got an empty mapping'),
+    ({'when': '{send_goal: /count, feedback: []}'}, '[ out-of-range: expected at least 1 item, got an empty list'),
     # Times.
     ({'when': '{at: 10.1, publish: /scan}'}, '10.1 after-the-end: 10.1 s is after the end of the '
      "case, which is at 10 s (let the case last longer, with 'until')"),
@@ -161,7 +174,9 @@ def test_what_does_not_fit_is_found_at_its_place(check_case, wrong):
 
 def test_the_errors_of_the_system_are_told(check, project):
     (project / 'robot.yaml').write_text('version: 1\nnodes:\n  robot:\n    timrs: {}\n')
-    found = check('version: 1\nsystem: {file: robot.yaml}\ncases: {one: {then: [], until: 1}}\n')
+    found = check(
+        'version: 1\nsystem: {file: robot.yaml}\ncases: {one: {then: [{exit_code: 0}], until: 1}}\n'
+    )
     assert [(each.file, each.rule) for each in found] == [('robot.yaml', 'unknown-key')]
 
 

@@ -19,14 +19,14 @@ def step_of(data):
     return parse_step(data, ('cases', 'c', 'when', 0), NameReader({}))
 
 
-def case_of(*then, until=10):
+def case_of(*then, until=10, steps=()):
     names = NameReader({})
     expectations = tuple(
         parse_expectation(each, ('cases', 'c', 'then', index), names, lambda text: text)
         for index, each in enumerate(then)
     )
     given = GivenSpec({}, None, {}, {}, ())
-    return CaseSpec('c', '', given, (), expectations, until * 10**9, 0, 60.0, ('cases', 'c'))
+    return CaseSpec('c', '', given, steps, expectations, until * 10**9, 0, 60.0, ('cases', 'c'))
 
 
 @pytest.fixture

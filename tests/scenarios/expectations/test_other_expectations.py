@@ -165,8 +165,9 @@ GOAL = {'send_goal': '/dock', 'feedback': [1, 2], 'result': {'data': 3}}
         ({'set_parameters': {'n': {'a': 1}}}, {'problem': 'too small'}, 'set_parameters',
          'the parameters of /n cannot be set at 1 s: too small'),
         ({'set_parameters': {'n': {'a': 1}}, 'refused': True}, {'problem': 'too small'}, None, None),
-        ({'set_parameters': {'n': {'a': 1}}, 'refused': True}, {'end_ns': 1}, 'refused',
-         'expected /n to refuse the parameters at 1 s'),
+        ({'set_parameters': {'n': {'a': 1}}, 'refused': True},
+         {'answer': ["'b' of /m"], 'problem': 'too small'}, 'refused',
+         "expected /n to refuse the parameters at 1 s, but 'b' of /m can be set"),
         ({'publish': '/a'}, {'problem': 'no type'}, 'publish', 'cannot publish on /a at 1 s: no type'),
     ],
 )  # fmt: skip
@@ -174,6 +175,12 @@ def test_steps_have_outcomes(step, outcome, key, message):
     failures = evaluate(case_of(), [], [Outcome(step_of(step), 10**9, **outcome)])
     assert [each.message for each in failures] == ([message] if message else [])
     assert [each.path[4] for each in failures] == ([key] if key else [])
+
+
+def test_a_step_is_not_done_after_the_end_of_the_system():
+    steps = tuple(step_of({'at': second, 'publish': '/a'}) for second in (1, 2, 3))
+    (failure,) = evaluate(case_of(steps=steps), [at(2, 'exit', '', 0)])
+    assert failure.message == 'the step at 3 s is not done: the system ended at 2 s'
 
 
 def like(found, recorded, **options):
