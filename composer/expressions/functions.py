@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -104,10 +105,28 @@ def from_yaml(text: Any) -> Any:
     return value
 
 
+def path_join(parts: Any) -> str:
+    """Return parts of a path as one: an absolute part replaces those before it.
+
+    Raises:
+        TemplateRuntimeError: They are no texts.
+    """
+    items = parts if isinstance(parts, list | tuple) else [parts]
+    texts = [item for item in items if isinstance(item, str)]
+    if not texts or len(texts) < len(items):
+        message = f'path_join needs a list of texts, and not {parts!r}'
+        raise TemplateRuntimeError(message)
+    return posixpath.join(*texts)
+
+
 _TRUTH = {'true': True, '1': True, 'false': False, '0': False}
 _LONGEST_YAML = 10_000
-# Filters beside those of jinja2; both have the names that they have in Ansible.
-FILTERS: Mapping[str, Callable[..., Any]] = {'bool': to_bool, 'from_yaml': from_yaml}
+# Filters beside those of jinja2, with the names that they have in Ansible.
+FILTERS: Mapping[str, Callable[..., Any]] = {
+    'bool': to_bool,
+    'from_yaml': from_yaml,
+    'path_join': path_join,
+}
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     'env': read_environment,
     'find': find_package_share,

@@ -1,7 +1,8 @@
 """Which arguments foreign code only writes into its result, and which of them decide what it does.
 
 The code is run with the arguments as they are, and again with a mark in place of each that it has
-read. If the result is the same but for the mark, an expression can take its place.
+read. If the result is the same but for the mark, an expression can take its place; unless the code
+has compared it with something, or looked for it, which may end otherwise with another value.
 """
 
 from __future__ import annotations
@@ -10,20 +11,76 @@ import contextlib
 import os
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from composer.launch_files.texts import Text
+from composer.launch_files.texts import Text, marked, one
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from composer.launch_files.surroundings import Scope
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from typing import Self
 
 _Result = TypeVar('_Result')
 # Each is a run of the code.
 _MOST_TRIED = 40
+# Methods that the language has, too, for texts.
+_SAME = ('lower', 'upper', 'strip', 'lstrip', 'rstrip', 'replace', 'removeprefix', 'removesuffix')
+_LOOKS = (
+    *('__eq__', '__ne__', '__lt__', '__le__', '__gt__', '__ge__', '__hash__', '__contains__'),
+    *('__len__', '__iter__', '__getitem__', *(name for name in dir(str) if name[0] != '_')),
+)
+_looked: list[object] = []
+
+
+class Mark(str):
+    """A text that stands for another one in what code makes of it, and notes if it is read.
+
+    Attributes:
+        stands_for: The other one. What reads the mark gets its value.
+    """
+
+    __slots__ = ('stands_for',)
+    stands_for: Text
+
+    def __new__(cls, text: Text) -> Self:
+        """Return the mark for a text."""
+        self = super().__new__(cls, marked(text))
+        self.stands_for = text
+        return self
+
+    def __int__(self) -> int:
+        """Return the value as a number, as `int` does."""
+        note_look(self)
+        return int(self.stands_for.text)
+
+    def __float__(self) -> float:
+        """Return the value as a number, as `float` does."""
+        note_look(self)
+        return float(self.stands_for.text)
+
+
+def note_look(what: object) -> None:
+    """Note that what is read now may decide what the code does."""
+    _looked.append(what)
+
+
+def _noting(name: str) -> Any:
+    method = getattr(str, name)
+
+    def look(mark: Mark, *args: Any, **keywords: Any) -> Any:
+        value = method(mark.stands_for.text, *args, **keywords)
+        if name in _SAME and not keywords and all(type(each) in (str, int) for each in args):
+            shown = ', '.join(map(repr, args))
+            return Mark(one(f'{mark.stands_for.code}.{name}({shown})', value))
+        note_look(mark)
+        return value
+
+    return look
+
+
+for _name in _LOOKS:
+    setattr(Mark, _name, _noting(_name))
 
 
 def run_marked(
-    scope: Scope,
+    configurations: Mapping[str, Any],
     attempt: Callable[[frozenset[str]], tuple[_Result, Iterable[str]]],
     outcome: Callable[[_Result], Any],
 ) -> tuple[_Result, list[str]]:
@@ -37,17 +94,21 @@ def run_marked(
     expected = outcome(plain)
 
     def succeeds(names: frozenset[str]) -> _Result | None:
+        before = len(_looked)
         try:
             with _quiet():
                 result, _ = attempt(names)
-                return result if outcome(result) == expected else None
+                is_same = len(_looked) == before and outcome(result) == expected
+                return result if is_same else None
         except Exception:  # noqa: BLE001 - foreign code, given what it never expected
             return None
+        finally:
+            del _looked[before:]
 
     names = [
         name
         for name in read
-        if isinstance(value := scope.configurations.get(name), Text) and not value.is_constant
+        if isinstance(value := configurations.get(name), Text) and not value.is_constant
     ]
     safe = frozenset(each for each in names[:_MOST_TRIED] if succeeds(frozenset((each,))))
     best = succeeds(safe) if safe else None

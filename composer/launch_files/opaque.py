@@ -32,7 +32,9 @@ class OpaqueRuns:
     def run(self, entity: Any) -> None:
         """Add what a function returns."""
         place = self._place
-        best, fixed = run_marked(place.scope, lambda marks: self._attempt(entity, marks), _outcome)
+        best, fixed = run_marked(
+            place.scope.configurations, lambda marks: self._attempt(entity, marks), _outcome
+        )
         place.adopt(best)
         if fixed:
             place.fix(fixed)
@@ -66,7 +68,7 @@ class OpaqueRuns:
     def _take_changes(fork: Place, before: dict[str, Any]) -> None:
         """Take over the configurations that the function has set itself."""
         for name, value in fork.loader.context.launch_configurations.items():
-            if isinstance(value, str) and before.get(name) != value:
+            if isinstance(value, str) and before.get(name) is not value:
                 fork.scope.configurations[name] = Resolver(fork).text(value)
 
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from composer.launch_files.place import Place
 
 _SHARE = re.compile(r'^(?:file://)?(/[^\s:]*?)/share/([A-Za-z]\w*)(?=/|$)')
+_FOUND = re.compile(r"find\('\w+'\)")
 # What `LaunchConfigAsBool` takes for true.
 _TRUE = ('true', '1', 'yes', 'on')
 # What launch itself reads, for each program: arguments only where a launch file declares them.
@@ -78,9 +79,9 @@ class Resolver:
         if written is None:
             return EMPTY
         if isinstance(written, str | Path):
-            return _constant(str(written))
+            return text_of(str(written))
         if isinstance(written, bool | int | float):
-            return _constant(str(written))
+            return text_of(str(written))
         if isinstance(written, list | tuple):
             return joined(map(self.text, written))
         return self._substitution(written)
@@ -88,7 +89,7 @@ class Resolver:
     def is_true(self, written: Any) -> Text:
         """Return a text for something that is true or false."""
         if isinstance(written, bool):
-            return _constant('true' if written else 'false')
+            return text_of('true' if written else 'false')
         return self.text(written)
 
     def _substitution(self, written: Any) -> Text:
@@ -101,13 +102,15 @@ class Resolver:
     def _performed(self, written: Any) -> Text:
         """Return what `launch` makes of a substitution, with marks where arguments are in it."""
         text, fixed = run_marked(
-            self._scope, lambda marks: self._perform(written, marks), self._outcome
+            self._scope.configurations,
+            lambda marks: self._perform(written, marks),
+            self._outcome,
         )
         if fixed:
             self._place.fix(fixed)
             shown = ', '.join(fixed)
             self._remark(f'{type(written).__name__} was resolved: it depends on {shown}')
-        return _constant(text)
+        return text_of(text)
 
     def _perform(self, written: Any, marks: frozenset[str]) -> tuple[str, list[str]]:
         self._scope.fill(self._context, marks)
@@ -125,7 +128,7 @@ class Resolver:
         return unmarked(repr(read_file(path))) if self._place.result.is_new_file(path) else path
 
     def _text(self, written: Any) -> Text:
-        return _constant(str(written.text))
+        return text_of(str(written.text))
 
     def _configuration(self, written: Any) -> Text:
         name = self.text(private(written, 'variable_name')).text
@@ -176,20 +179,13 @@ class Resolver:
         return joined((self._prefix(written), Text(('/lib',)), package, program), '/')
 
     def _path(self, written: Any) -> Text:
-        parts = [self.text(each) for each in private(written, 'substitutions')]
-        path = EMPTY
-        for part in parts:
-            if part.text.startswith('/') or not path.parts:
-                path = part
-            else:
-                path = joined((path, part), '' if path.text.endswith('/') else '/')
-        return path
+        return path_of([self.text(each) for each in private(written, 'substitutions')])
 
     def _file(self, _written: Any) -> Text:
-        return _constant(str(self._scope.file))
+        return text_of(str(self._scope.file))
 
     def _file_folder(self, _written: Any) -> Text:
-        return _constant(str(self._scope.file.parent if self._scope.file else ''))
+        return text_of(str(self._scope.file.parent if self._scope.file else ''))
 
     def _program(self, written: Any) -> Text:
         return self.text(private(written, 'name'))
@@ -204,7 +200,7 @@ class Resolver:
         except UnlikeError:
             self._place.result.freeze(source)
             self._remark(f'{source.text} was resolved to {result}')
-            return _constant(result)
+            return text_of(result)
 
     def _evaluated(self, source: str, modules: Sequence[str]) -> Any:
         import importlib
@@ -226,7 +222,7 @@ class Resolver:
         value = self.text(private(written, 'config'))
         text = str(value.text.strip().lower() in _TRUE)
         if value.is_constant:
-            return _constant(text)
+            return text_of(text)
         return one(f'({value.code} | lower in {list(_TRUE)})', text, 'python-bool')
 
     def _not(self, written: Any) -> Text:
@@ -263,13 +259,13 @@ class Resolver:
     def _unequal(self, written: Any) -> Text:
         equal = self._equal(written)
         if equal.is_constant:
-            return _constant('false' if equal.text == 'true' else 'true')
+            return text_of('false' if equal.text == 'true' else 'true')
         return one(f'(not {equal.code})', 'false' if equal.text == 'true' else 'true', 'bool')
 
     def _truth(self, code: str, value: bool, *of: Text) -> Text:  # noqa: FBT001 - the value itself
         text = 'true' if value else 'false'
         if all(each.is_constant for each in of):
-            return _constant(text)
+            return text_of(text)
         return one(code, text, 'bool')
 
     def _one_of_two(self, written: Any) -> Text:
@@ -288,7 +284,27 @@ class Resolver:
         return split_words(self.text(private(items[0], 'command')))
 
 
-def _constant(text: str) -> Text:
+def path_of(parts: Sequence[Text]) -> Text:
+    """Return parts of a path as one, as `os.path.join` does: an absolute part comes alone."""
+    texts = [part.text for part in parts]
+    ends = [part.parts[-1:] for part in parts[:-1]] + [part.parts[:1] for part in parts[1:]]
+    if any(isinstance(each, Code) and not _is_share(each) for end in ends for each in end):
+        codes = ', '.join(part.code for part in parts)
+        return one(f'([{codes}] | path_join)', os.path.join(*texts))  # noqa: PTH118 - of texts
+    path = EMPTY
+    for part in parts:
+        if part.text.startswith('/') or not path.parts:
+            path = part
+        else:
+            path = joined((path, part), '' if path.text.endswith('/') else '/')
+    return path
+
+
+def _is_share(part: Code) -> bool:
+    return _FOUND.fullmatch(part.code) is not None
+
+
+def text_of(text: str) -> Text:
     """Return a text, with the share folders of packages in it as `find(…)`."""
     plain = constant(text)
     first = plain.parts[0] if plain.parts else ''

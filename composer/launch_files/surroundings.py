@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from composer.launch_files.texts import Text, chosen, marked, one
+from composer.launch_files.marks import Mark
+from composer.launch_files.texts import Text, chosen, one
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -160,7 +161,7 @@ class Scope:
 
 def _plain(value: Any, *, is_marked: bool) -> Any:
     if isinstance(value, Text):
-        return marked(value) if is_marked and not value.is_constant else value.text
+        return Mark(value) if is_marked and not value.is_constant else value.text
     values = [item.value for item in value if item.holds]
     return [
         tuple(each.text if isinstance(each, Text) else each for each in item)

@@ -188,6 +188,11 @@ def _from_here(data: Any, folder: str | None) -> Any:
         return {key: _from_here(value, folder) for key, value in data.items()}
     if isinstance(data, list):
         return [_from_here(value, folder) for value in data]
+    if isinstance(data, Computed) and folder is not None:
+        # The first of the parts of a path.
+        text = re.sub(rf"^({{{{ (?:\(\[)+)'{re.escape(folder)}(?=[/'])", r"\1here ~ '", data)
+        if text != data:
+            return Computed(text.replace(" ~ ''", ''), data.value)
     is_path = isinstance(data, str) and folder is not None and data.startswith(f'{folder}/')
     if not is_path or (not isinstance(data, Computed) and '{' in data):
         return data

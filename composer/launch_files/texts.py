@@ -126,7 +126,7 @@ EMPTY = Text(())
 
 def constant(text: str) -> Text:
     """Return a text with what was marked in it by `marked` as expressions again."""
-    if '\ue000' not in text:
+    if not has_marks(text):
         return Text((text,)) if text else EMPTY
     parts: list[str | Code] = []
     for index, piece in enumerate(_MARK.split(text)):
@@ -141,6 +141,11 @@ def constant(text: str) -> Text:
 def marked(text: Text) -> str:
     """Return a text that stands for another one in what a function makes of it."""
     return f'\ue000{text.code}\ue002{text.text}\ue001'
+
+
+def has_marks(text: object) -> bool:
+    """Return whether something is a text with marks."""
+    return isinstance(text, str) and _MARK.search(text) is not None
 
 
 def unmarked(text: str) -> str:

@@ -3,7 +3,7 @@
 import pytest
 from jinja2 import TemplateRuntimeError
 
-from composer.expressions.functions import from_yaml, to_bool
+from composer.expressions.functions import from_yaml, path_join, to_bool
 
 
 @pytest.mark.parametrize(
@@ -42,3 +42,17 @@ def test_bool_refuses_all_else(text):
 def test_from_yaml_refuses_what_no_parameter_can_be(text):
     with pytest.raises(TemplateRuntimeError):
         from_yaml(text)
+
+
+@pytest.mark.parametrize(
+    ('parts', 'path'),
+    [(['/a', 'b'], '/a/b'), (['/a/', 'b', ''], '/a/b/'), (['/a', '/b', 'c'], '/b/c'), ('a', 'a')],
+)
+def test_an_absolute_part_of_a_path_replaces_those_before_it(parts, path):
+    assert path_join(parts) == path
+
+
+@pytest.mark.parametrize('parts', [[], ['a', 1], 3])
+def test_path_join_refuses_all_but_texts(parts):
+    with pytest.raises(TemplateRuntimeError, match='needs a list of texts'):
+        path_join(parts)

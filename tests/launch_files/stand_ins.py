@@ -37,6 +37,11 @@ class FindPackageShare(Substitution):
         self.package = package
 
 
+class PathJoinSubstitution(Substitution):
+    def __init__(self, substitutions):
+        self.substitutions = substitutions
+
+
 class Shouted(Substitution):
     """A substitution that nobody knows, and that keeps what it is given."""
 

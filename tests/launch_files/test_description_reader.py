@@ -1,11 +1,16 @@
 """Launch descriptions → systems, with stand-ins for the objects of `launch`."""
 
+import os
+from functools import reduce
+from pathlib import Path
+
 import pytest
 import yaml
 
 from composer.errors import UsageError
 from composer.language.pipeline import load_system
 from composer.launch_files.description_reader import DescriptionReader
+from composer.launch_files.importing import joining_marks
 from composer.launch_files.place import Place
 from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
@@ -156,6 +161,68 @@ def test_an_argument_that_decides_what_a_function_returns_cannot_change(tmp_path
     system = read(launch.OpaqueFunction(decide))
     assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
     assert '# line 1 of OpaqueFunction: OpaqueFunction was resolved' in system.text
+
+
+@pytest.mark.parametrize(
+    'test',
+    [
+        lambda text: text == 'race',
+        lambda text: text.lower() == 'race',
+        lambda text: text in ('race', 'x'),
+        {'race': True}.get,
+        lambda text: not text,
+        lambda text: 'race' in text,
+        lambda text: text.startswith('/'),
+        lambda text: os.path.splitext(text)[1],  # noqa: PTH122 - what launch files write
+        lambda text: os.path.exists(os.path.join('/etc', text)),  # noqa: PTH110, PTH118 - too
+        lambda text: (Path('/etc') / text).exists(),
+        lambda text: text.isdigit(),
+    ],
+)
+def test_what_a_function_may_decide_otherwise_with_another_value_cannot_change(test):
+    def decide(context):
+        return [node()] if test(context.launch_configurations['side']) else []
+
+    with joining_marks():
+        system = read(launch.OpaqueFunction(decide))
+    assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
+
+
+@pytest.mark.parametrize('given', ['left', '/tmp/other', ''])
+@pytest.mark.parametrize(
+    'join',
+    [
+        lambda *parts: launch.PathJoinSubstitution(python(*parts)),
+        lambda *parts: Joining(os.path.join, parts),
+        lambda first, *others: Joining(
+            lambda *parts: reduce(lambda path, part: path / part, parts, Path(first)), others
+        ),
+    ],
+)
+@pytest.mark.parametrize('parts', [('/tmp/a', SIDE), ('/tmp/a', 'b', SIDE, 'c.yaml')])
+def test_an_absolute_argument_replaces_what_it_is_joined_to(tmp_path, join, parts, given):
+    with joining_marks():
+        place = Place(launch.Loader(), {})
+        entities = [launch.DeclareLaunchArgument('side', 'left'), node(arguments=[join(*parts)])]
+        DescriptionReader(place).read([launch.LaunchDescription(entities)])
+    system = render_system(place.result, 'x.launch.py', 'x', '/tmp/a')
+    (process,) = resolved(tmp_path, system, f'side:={given}').values()
+    expected = os.path.join(*(given if each is SIDE else each for each in parts))  # noqa: PTH118
+    start = str(tmp_path) if not given.startswith('/') else ''
+    assert os.path.normpath(process.arguments[0]) == os.path.normpath(
+        expected.replace('/tmp/a', start, 1) if start else expected
+    )
+
+
+class Joining(launch.Substitution):
+    """A substitution of a launch file, which joins paths with a function."""
+
+    def __init__(self, function, parts):
+        self._function, self._parts = function, parts
+
+    def perform(self, context):
+        parts = (each if isinstance(each, str) else each.perform(context) for each in self._parts)
+        return str(self._function(*parts))
 
 
 def test_what_begins_when_another_ends_waits_for_it(tmp_path):
