@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SUPPORT = 'composer_stubs'
 PAYLOADS = f'{SUPPORT}.payloads'
 
-_BUILTINS = ('bool', 'bytes', 'float', 'int', 'list', 'property', 'str')
+_BUILTINS = ('bool', 'bytes', 'float', 'int', 'list', 'property', 'str', 'tuple')
 _FLOATS = ('float32', 'float64')
 _STRINGS = ('string', 'wstring')
 # What rclpy's `Time` and `Duration` stand for in payloads, by their `to_msg()`.
@@ -111,7 +111,14 @@ class FieldTypes:
         item = self._taken(field_type)
         if field_type.kind in _FLOATS or field_type.kind in _ARRAY_INTEGERS:
             return f'{self.imports.take("typing", "Iterable")}[{item}]'
-        return f'{self.imports.support("Items")}[{item}]'
+        a_set = self.imports.take('typing', 'AbstractSet')
+        return f'{self.imports.support("Items")}[{item}] | {a_set}[{item}]'
+
+    def bare(self, field_type: FieldType) -> str:
+        """Return the type of what stands for a message that has only this field."""
+        if field_type.nested is None or field_type.array is not None:
+            return self.payload(field_type)
+        return f'{self.imports.payload(field_type.nested)}Value'
 
     def payload(self, field_type: FieldType) -> str:
         """Return the type of what a payload may hold for a field."""
@@ -122,6 +129,9 @@ class FieldTypes:
         if field_type.array is None:
             return item
         items = f'{self.imports.support("Items")}[{item}]'
+        if field_type.nested is not None:
+            # mypy reads the mappings in a tuple as those of the message only where it says so.
+            items = f'{items} | {self.word("tuple")}[{item}, ...]'
         octets = ' | bytes | bytearray | memoryview' if field_type.kind in OCTET_KINDS else ''
         return f'{items}{octets}'
 

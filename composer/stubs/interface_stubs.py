@@ -36,14 +36,13 @@ _OF_ACTIONS = (*_OF_SERVICES, 'action_msgs', 'unique_identifier_msgs')
 
 
 def write_packages(
-    packages: Iterable[str], declared: DeclaredPackages, *, takes_any_mapping: bool = True
+    packages: Iterable[str], declared: DeclaredPackages
 ) -> Iterator[tuple[str, list[str]]]:
     """Yield the path and the lines of each stub of packages, and of those that they use.
 
     Args:
         packages: Their names; those that do not exist are left out.
         declared: The packages that the system itself declares.
-        takes_any_mapping: See `payload_stubs`.
     """
     own = {each.package: each.interfaces for each in declared.definitions or ()}
     done: set[str] = set()
@@ -56,14 +55,11 @@ def write_packages(
         interfaces = own.get(package) or _describe_installed(package)
         if interfaces:
             pending += _used_packages(interfaces)
-            yield from _write_package(package, interfaces, takes_any_mapping=takes_any_mapping)
+            yield from _write_package(package, interfaces)
 
 
 def _write_package(
-    package: str,
-    interfaces: Mapping[str, InterfaceDescription | None],
-    *,
-    takes_any_mapping: bool,
+    package: str, interfaces: Mapping[str, InterfaceDescription | None]
 ) -> Iterator[tuple[str, list[str]]]:
     yield f'{package}/__init__.pyi', []
     for kind in _KINDS:
@@ -76,8 +72,7 @@ def _write_package(
     messages = [
         message for each in interfaces.values() if each is not None for message in each.parts
     ]
-    lines = [*write_payloads(package, messages, takes_any_mapping=takes_any_mapping)]
-    yield f'composer_stubs/payloads/{package}.pyi', lines
+    yield f'composer_stubs/payloads/{package}.pyi', [*write_payloads(package, messages)]
 
 
 def _used_packages(interfaces: Mapping[str, InterfaceDescription | None]) -> Iterator[str]:

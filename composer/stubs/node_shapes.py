@@ -9,9 +9,11 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from composer.inference.reading import CreatedEntity
     from composer.language.specs import NodeSpec, ParameterSpec
 
-# The types of the entities of one section, by name; of one node, each has one.
+# The types of the entities of one section, by name. Behaviours create some whose name or type is
+# not known: that is empty.
 _Types: TypeAlias = 'tuple[tuple[str, tuple[str, ...]], ...]'
 
 _PARAMETER_TYPES = {
@@ -49,18 +51,23 @@ class NodeShape:
     state: tuple[str, ...] | None
 
 
-def shape_of(node: NodeSpec, stored: Sequence[frozenset[str] | None]) -> NodeShape:
+def shape_of(
+    node: NodeSpec,
+    stored: Sequence[frozenset[str] | None],
+    created: Sequence[CreatedEntity],
+) -> NodeShape:
     """Return the shape of a node.
 
     Args:
         stored: The names that each module of its behaviours may set in `node.state`; `None` for
             one that may set any.
+        created: What its behaviours create.
     """
     parameters = {name: (_type_of(each),) for name, each in node.parameters.items()}
     own = {name: (of_type,) for name, of_type in _OWN_PARAMETERS.items()}
     return NodeShape(
-        _types(node.publishers),
-        _types(node.service_clients),
+        _types(node.publishers, created, 'publisher'),
+        _types(node.service_clients, created, 'service client'),
         _types(node.action_clients),
         tuple(sorted({**own, **parameters}.items())),
         None if None in stored else tuple(sorted({*node.state, *_all_of(stored)})),
@@ -94,11 +101,17 @@ def _merged(sections: Iterable[_Types]) -> _Types:
     for section in sections:
         for name, types in section:
             merged.setdefault(name, {}).update(dict.fromkeys(types))
-    return tuple(sorted((name, tuple(types)) for name, types in merged.items()))
+    # The first overload that fits counts, so the one for any name comes last.
+    names = sorted(merged, key=lambda name: (not name, name))
+    return tuple((name, tuple(merged[name])) for name in names)
 
 
-def _types(entities: Mapping[str, Any]) -> _Types:
-    return tuple(sorted((name, (each.type,)) for name, each in entities.items()))
+def _types(
+    entities: Mapping[str, Any], created: Iterable[CreatedEntity] = (), kind: str = ''
+) -> _Types:
+    declared = [(name, (each.type,)) for name, each in entities.items()]
+    made = [(each.name or '', (each.type or '',)) for each in created if each.kind == kind]
+    return _merged([(*declared, *made)])
 
 
 def _type_of(parameter: ParameterSpec) -> str:

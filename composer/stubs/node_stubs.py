@@ -112,14 +112,15 @@ class _Writer:
         return self._method('publish', self._literal(name), self._payloads(types), '', 'None')
 
     def _call(self, method: str, name: str, types: Sequence[str]) -> str:
-        requests = self._payloads([f'{each}_Request' for each in types])
-        responses = [self.imports.message(f'{each}_Response') for each in types]
-        answer = responses[0] if len(responses) == 1 else self.imports.take('typing', 'Any')
+        requests = self._payloads(types, '_Request')
+        anything = self.imports.take('typing', 'Any')
+        is_known = len(types) == 1 and types[0]
+        answer = self.imports.message(f'{types[0]}_Response') if is_known else anything
         rest = f' | None = None, {_TIMEOUT}'
         return self._method(method, self._literal(name), requests, rest, answer)
 
     def _send_goal(self, name: str, types: Sequence[str]) -> str:
-        goals = self._payloads([f'{each}_Goal' for each in types])
+        goals = self._payloads(types, '_Goal')
         anything = self.imports.take('typing', 'Any')
         parts = [anything, anything]
         if len(types) == 1:
@@ -144,10 +145,14 @@ class _Writer:
         decorator = f'    @{self.imports.take("typing", "overload")}'
         return [line for method in several for line in (decorator, method)]
 
-    def _payloads(self, types: Sequence[str]) -> str:
-        return ' | '.join(map(self.imports.payload, types))
+    def _payloads(self, types: Sequence[str], part: str = '') -> str:
+        if '' in types:
+            return self.imports.take('typing', 'Any')
+        return ' | '.join(self.imports.payload(f'{each}{part}') for each in types)
 
     def _literal(self, name: str) -> str:
+        if not name:
+            return 'str'
         return f'{self.imports.take("typing", "Literal")}[{name!r}]'
 
     def _value(self, of_type: str) -> str:

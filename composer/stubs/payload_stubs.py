@@ -1,7 +1,8 @@
 """What behaviours may give for a message, as types: `composer_stubs.payloads.<package>`.
 
-A payload is a message, a mapping of fields, or the bare value of a message with one field. Type
-checkers hold a mapping that is written out against the fields, and let any other mapping pass.
+A payload is a message, a mapping of fields, or the bare value of a message with one field. A
+mapping is a `TypedDict`: `Mapping[str, Any]` would take any key. So one that is built in steps is
+declared as the `TypedDict`, or as `Any`.
 """
 
 from __future__ import annotations
@@ -16,45 +17,34 @@ if TYPE_CHECKING:
     from composer.interfaces.descriptions import MessageDescription
 
 
-def write_payloads(
-    package: str, messages: Iterable[MessageDescription], *, takes_any_mapping: bool = True
-) -> Iterator[str]:
-    """Yield the lines of the stub with the payloads of a package's messages.
-
-    Args:
-        takes_any_mapping: Whether a mapping whose keys are not known fits every message.
-    """
+def write_payloads(package: str, messages: Iterable[MessageDescription]) -> Iterator[str]:
+    """Yield the lines of the stub with the payloads of a package's messages."""
     imports = StubImports(f'{PAYLOADS}.{package}')
-    lines = [
-        line
-        for message in messages
-        for line in _write_payload(message, imports, takes_any_mapping=takes_any_mapping)
-    ]
+    lines = [line for message in messages for line in _write_payload(message, imports)]
     yield from imports.lines()
     yield from lines
 
 
-def _write_payload(
-    message: MessageDescription, imports: StubImports, *, takes_any_mapping: bool
-) -> Iterator[str]:
-    types = FieldTypes(imports)
+def _write_payload(message: MessageDescription, imports: StubImports) -> Iterator[str]:
+    types = FieldTypes(imports, frozenset(field.name for field in message.fields))
     last = message.name.rpartition('/')[2]
-    options = [imports.message(message.name)]
+    message_class = imports.message(message.name)
+    # A mapping names the fields of the message itself, so a bare value for its one field is none.
+    values = [message_class, f'{imports.support("ToMsg")}[{message_class}]']
+    if not message.fields:
+        values.append('None')
+    if len(message.fields) == 1:
+        values.append(types.bare(message.fields[0].type))
+    alias = imports.take('typing', 'TypeAlias')
+    yield from ('', f'{last}Value: {alias} = {" | ".join(values)}')
     if all(is_writable(field.name) for field in message.fields):
         typed_dict = imports.take('typing', 'TypedDict')
-        yield from ('', f'class {last}Fields({typed_dict}, total=False):')
+        yield f'class {last}Fields({typed_dict}, total=False):'
         if not message.fields:
             yield '    pass'
         for field in message.fields:
             yield f'    {field.name}: {types.payload(field.type)}'
-        options.append(f'{last}Fields')
-    if takes_any_mapping or len(options) == 1:
+    else:
         anything = imports.take('typing', 'Any')
-        options.append(f'{imports.take("typing", "Mapping")}[str, {anything}]')
-    if not message.fields:
-        options.append('None')
-    if len(message.fields) == 1:
-        options.append(types.payload(message.fields[0].type))
-    if message.name in ('builtin_interfaces/msg/Time', 'builtin_interfaces/msg/Duration'):
-        options.append(f'{imports.support("ToMsg")}[{options[0]}]')
-    yield f'{last}: {imports.take("typing", "TypeAlias")} = {" | ".join(options)}'
+        yield f'{last}Fields: {alias} = {imports.take("typing", "Mapping")}[str, {anything}]'
+    yield f'{last}: {alias} = {last}Value | {last}Fields'

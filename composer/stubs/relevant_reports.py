@@ -52,10 +52,14 @@ _KEPT = frozenset(
         'call-arg',
         'call-overload',
         'comparison-overlap',
+        'dict-item',
         'index',
+        'list-item',
         'misc',
         'operator',
         'return-value',
+        'typeddict-item',
+        'typeddict-unknown-key',
         'unused-coroutine',
         'reportArgumentType',
         'reportAttributeAccessIssue',
@@ -102,7 +106,7 @@ class RelevantReports:
         return (
             self._is_about_stubs(report)
             and self._is_of_interface(report)
-            and _is_shown(report, found)
+            and _is_shown(report, found, self.classes)
             and not self._is_reused(report)
             and not any(id(node) in self._guarded for node in found)
             and not self._is_asked_for(report, found)
@@ -184,6 +188,7 @@ class RelevantReports:
         return is_of_node or bool(words & (self.classes | self.packages))
 
 
+_DISPLAYS = (ast.Dict, ast.List, ast.Tuple)
 _PLAIN = (ast.Constant, ast.JoinedStr, ast.UnaryOp, ast.BinOp, ast.Compare, ast.Attribute)
 
 
@@ -228,24 +233,20 @@ def _names(expression: ast.expr) -> Iterator[str]:
             yield node.attr
 
 
-def _is_shown(report: TypeReport, found: list[ast.AST]) -> bool:
+def _is_shown(report: TypeReport, found: list[ast.AST], classes: frozenset[str]) -> bool:
     """Return whether the code shows what a report is about: a name or mapping written out.
 
     Of a name or mapping that is computed, a type checker knows too little.
     """
     text = ' '.join([report.message, *report.notes])
     if 'dict[' in text or 'Collection[' in text:
-        mappings = [node for node in found if isinstance(node, ast.Dict)]
+        payloads = [node.value if isinstance(node, ast.Yield) else node for node in found]
         calls = [node for node in found if isinstance(node, ast.Call)]
         if calls and 'overload' in text:
-            mappings = [each for each in calls[0].args[1:2] if isinstance(each, ast.Dict)]
-            mappings = mappings if _has_literal_name(calls) else []
-        mappings += [
-            node.value
-            for node in found
-            if isinstance(node, ast.Yield) and isinstance(node.value, ast.Dict)
-        ]
-        return any(map(_is_plain, mappings))
+            named = [each.value for each in calls[0].keywords if each.arg == 'payload']
+            payloads = [*calls[0].args[1:2], *named] if _has_literal_name(calls) else []
+        displays = [each for each in payloads if isinstance(each, _DISPLAYS)]
+        return any(_is_plain(each, classes) for each in displays)
     if report.code == 'return-value' and re.search(r'got "[^"]*\b(Any|object)\b', text):
         return False
     if report.code in ('call-overload', 'reportCallIssue') and 'overload' in text:
@@ -270,13 +271,19 @@ def _has_literal_name(found: Iterable[ast.AST]) -> bool:
     return False
 
 
-def _is_plain(value: ast.expr) -> bool:
+def _is_plain(value: ast.expr, classes: frozenset[str]) -> bool:
     """Return whether the code shows the type of a value, or it is no mapping at least."""
+    parts: list[ast.expr] = []
     if isinstance(value, ast.Dict):
-        keys = all(isinstance(key, ast.Constant) for key in value.keys)
-        return keys and all(map(_is_plain, value.values))
-    if isinstance(value, ast.List | ast.Tuple):
-        return all(map(_is_plain, value.elts))
-    if isinstance(value, ast.IfExp):
-        return _is_plain(value.body) and _is_plain(value.orelse)
-    return isinstance(value, _PLAIN)
+        if not all(isinstance(key, ast.Constant) for key in value.keys):
+            return False
+        parts = value.values
+    elif isinstance(value, ast.List | ast.Tuple):
+        parts = value.elts
+    elif isinstance(value, ast.IfExp):
+        parts = [value.body, value.orelse]
+    elif isinstance(value, ast.Call):
+        return next(_names(value.func), '') in classes
+    elif not isinstance(value, _PLAIN):
+        return False
+    return all(_is_plain(each, classes) for each in parts)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
+    from composer.inference.reading import CreatedEntity
+    from composer.language.specs import NodeSpec
     from composer.stubs.node_shapes import NodeShape
     from composer.stubs.project_modules import ProjectModule
 
@@ -36,20 +38,21 @@ def stubs_of(context: CheckContext) -> dict[str, str]:
 
 
 def write_messages(
-    context: CheckContext, modules: Mapping[str, ProjectModule], *, takes_any_mapping: bool = True
+    context: CheckContext, modules: Mapping[str, ProjectModule]
 ) -> Iterator[tuple[str, str]]:
     """Yield the stubs of what all systems share, and of the messages of one, with their paths."""
     yield f'{SUPPORT}/__init__.pyi', f'{HEADER}\n{read_template("composer_stubs.pyi")}'
     yield f'{SUPPORT}/payloads/__init__.pyi', text_of([])
     packages = {
-        end.type.partition('/')[0] for node in all_nodes(context) for _, end in node.ends()
+        end.type.partition('/')[0]
+        for node in all_nodes(context)
+        for end in (*(end for _, end in node.ends()), *_created(context, node))
+        if end.type
     }
     for module in modules.values():
         packages |= {name.partition('.')[0] for name in module.imports}
     packages &= {*context.catalogue.packages()}
-    stubs = write_packages(
-        sorted(packages), context.interfaces, takes_any_mapping=takes_any_mapping
-    )
+    stubs = write_packages(sorted(packages), context.interfaces)
     yield from ((path, text_of(lines)) for path, lines in stubs)
 
 
@@ -74,9 +77,15 @@ def shapes_of(context: CheckContext, modules: Mapping[str, ProjectModule]) -> di
     """Return the shapes of a system's nodes, by their keys in the file."""
     stored = {name: find_stored_names(module.tree) for name, module in modules.items()}
     return {
-        node.key: shape_of(node, [stored[each] for each in reach_of(node, modules)])
+        node.key: shape_of(
+            node, [stored[each] for each in reach_of(node, modules)], _created(context, node)
+        )
         for node in all_nodes(context)
     }
+
+
+def _created(context: CheckContext, node: NodeSpec) -> list[CreatedEntity]:
+    return [created for reading in context.readings(node) for created in reading.created]
 
 
 def name_classes(shapes: Mapping[str, NodeShape]) -> dict[str, NodeShape]:

@@ -66,7 +66,7 @@ class TypesCheck:
             classes = _Classes(module_of(context), shapes_of(context, modules))
             annotator = Annotator(find_received_values(context, modules), classes.of)
             written = {path: annotator.copy(module) for path, module in _by_path(modules)}
-            files = dict(write_messages(context, modules, takes_any_mapping=False))
+            files = dict(write_messages(context, modules))
             files |= classes.files()
             files['composer/__init__.pyi'] = read_template('composer.pyi')
             _write(stubs, files)
