@@ -25,6 +25,7 @@ from composer.inference.values import (
     join,
 )
 from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.return_values import may_return_nothing
 
 if TYPE_CHECKING:
     from composer.inference.evaluation.evaluator import Evaluator
@@ -63,11 +64,33 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     for value, place in scope.returned:
         with evaluator.run.condition(is_doubt=id(place.node) in scope.doubtful):
             _check(evaluator, returned, value, place)
-    if wire.needs_payload and not is_generator and not _is_stub(callee.definition):
-        # Some of the ways through it may give nothing, and others a payload.
-        for place in (place for value, place in scope.returned if is_none(value)):
-            if id(place.node) not in scope.doubtful:
-                evaluator.payloads.check(wire.returned, NONE, place)
+    if wire.needs_payload and not _is_stub(callee.definition):
+        _check_ways(evaluator, callee, scope, returned)
+
+
+def _check_ways(
+    evaluator: Evaluator, callee: Function, scope: Scope, returned: str | None
+) -> None:
+    """Check that all ways through a behaviour give the response or result that is waited for."""
+    definition = callee.definition
+    nothing = [place for value, place in scope.returned if is_none(value)]
+    is_begun = (
+        len(nothing) < len(scope.returned) or not evaluator.functions.kind_of(callee).is_generator
+    )
+    certain = [each for each in nothing if is_begun and id(each.node) not in scope.doubtful]
+    doubtful = [
+        place
+        for value, place in scope.returned
+        if isinstance(place.node, ast.Call) and any(map(is_none, alternatives(value)))
+    ]
+    if not isinstance(definition, ast.Lambda) and may_return_nothing(definition):
+        doubtful.append(Place(callee.module, definition))
+    for place in certain:
+        evaluator.payloads.check(returned, NONE, place)
+    if doubtful and not certain:
+        # What decides it may change while the system runs.
+        text = 'some ways through this function return nothing, and the caller gets an error'
+        evaluator.run.report('missing-return', doubtful[0], text, 'return something at its end')
 
 
 def _note_unpublished(evaluator: Evaluator, scope: Scope, wire: Wire) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.python_source.annotations import dotted_name
 from composer.python_source.local_names import stored_names
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ _VALUES = (
     ast.Tuple,
     ast.UnaryOp,
 )
+_WITHOUT_RETURN = {'exit', 'quit', 'sys.exit', 'os._exit', 'os.abort'}
 _CONVERSIONS = {'abs', 'bool', 'dict', 'float', 'int', 'len', 'list', 'round', 'str', 'sum'}
 
 
@@ -41,7 +43,9 @@ def always_answers(function: FunctionNode) -> bool:
     }
     sure = set() if message in stored else {message}
     answers = [statement.value for statement in _returns(function)]
-    return _ends(function.body) and all(_is_value(answer, sure) for answer in answers)
+    raises = any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function))
+    ends = not raises and _ends(function.body)
+    return ends and all(_is_value(answer, sure) for answer in answers)
 
 
 def passes_message_on(function: FunctionNode) -> bool:
@@ -83,16 +87,40 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
     return isinstance(answer, _VALUES) or (isinstance(answer, ast.Name) and answer.id in sure)
 
 
+def may_return_nothing(function: FunctionNode) -> bool:
+    """Return whether some paths through a function return a value, and others nothing."""
+    answers = [each.value for each in _returns(function)]
+    bare = [each for each in answers if each is None]
+    return len(bare) < len(answers) and bool(bare or not _ends(function.body))
+
+
 def _ends(body: list[ast.stmt]) -> bool:
-    """Return whether every path through a block ends with `return`."""
-    pending = [body]
-    while pending:
-        block = pending.pop()
-        last = block[-1] if block else None
-        if isinstance(last, ast.If):
-            pending += [last.body, last.orelse]
-        elif isinstance(last, ast.With | ast.AsyncWith):
-            pending.append(last.body)
-        elif not isinstance(last, ast.Return):
-            return False
-    return True
+    """Return whether no path through a block comes to its end: all return or raise."""
+    last = body[-1] if body else None
+    match last:
+        case ast.Return() | ast.Raise() | ast.Continue():
+            return True
+        case ast.Expr(value=ast.Call() as call):
+            return dotted_name(call.func) in _WITHOUT_RETURN
+        case ast.If(body=body, orelse=orelse):
+            return _ends(body) and _ends(orelse)
+        case ast.With() | ast.AsyncWith():
+            return _ends(last.body)
+        case ast.Try(body=body, orelse=orelse, finalbody=final, handlers=handlers):
+            blocks = [orelse or body, *(each.body for each in handlers)]
+            return bool(final and _ends(final)) or all(map(_ends, blocks))
+        case ast.Match(cases=cases):
+            is_whole = cases[-1].guard is None and _takes_all(cases[-1].pattern)
+            return is_whole and all(_ends(each.body) for each in cases)
+        case ast.While(test=ast.Constant(value=value)):
+            inner = [node for node in ast.walk(last) if isinstance(node, ast.Break)]
+            return bool(value) and not inner
+    return False
+
+
+def _takes_all(pattern: ast.pattern) -> bool:
+    if isinstance(pattern, ast.MatchOr):
+        return any(map(_takes_all, pattern.patterns))
+    return isinstance(pattern, ast.MatchAs) and (
+        pattern.pattern is None or _takes_all(pattern.pattern)
+    )

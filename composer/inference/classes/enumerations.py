@@ -20,8 +20,10 @@ from composer.inference.values import (
     constant,
     join,
 )
+from composer.spelling import suggest
 
 _ENUMERATIONS = {'enum.Enum', 'enum.IntEnum', 'enum.StrEnum', 'enum.Flag', 'enum.IntFlag'}
+_FLAGS = {'enum.Flag', 'enum.IntFlag'}
 # Those whose members are nothing else.
 _PLAIN = {'enum.Enum', 'enum.Flag', 'abc.ABC', 'builtins.object'}
 _CONVERSIONS = ('__index__', '__int__', '__float__', '__iter__', '__array__')
@@ -96,8 +98,18 @@ class Enumerations(Part):
         given = arguments.get(0, 'value')
         if given is None or not isinstance(given.value, Constant) or len(arguments.positional) > 1:
             return join(members) if members else UNKNOWN
-        found = (each for each in members if _value_of(each) == given.value)
-        return next(found, UNKNOWN)
+        values = [_value_of(each) for each in members]
+        is_known = all(isinstance(each, Constant) for each in values)
+        is_closed = is_known and not self._evaluator.classes.bodies.externals(of) & _FLAGS
+        wanted = given.value.value
+        found = [m for m, v in zip(members, values, strict=True) if _is_value(v, wanted)]
+        if not found and is_closed and not self._evaluator.classes.bodies.find(of, '_missing_'):
+            text = f"'{of.definition.name}' has no member whose value is {wanted!r}"
+            shown = [each.value for each in values if isinstance(each, Constant)]
+            self._evaluator.run.report(
+                'bad-call', given.place, text, suggest(wanted, shown, 'it has')
+            )
+        return found[0] if found else UNKNOWN
 
     def member_of_name(self, of: Class, index: Value) -> Value:
         """Return the member that has a name."""
@@ -113,6 +125,10 @@ def _place_of(of: Class, name: str) -> Place | None:
             case ast.Assign(targets=[ast.Name(id=stored) as target]) if stored == name:
                 return Place(of.module, target)
     return None
+
+
+def _is_value(value: Value | None, wanted: object) -> bool:
+    return isinstance(value, Constant) and value.value == wanted
 
 
 def _value_of(member: Value) -> Value | None:

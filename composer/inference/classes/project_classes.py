@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING, Any
+from pydoc import locate
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from composer.inference.classes.class_bodies import ClassBodies
 from composer.inference.classes.enumerations import Enumerations
@@ -36,14 +37,27 @@ from composer.inference.values import (
     is_none,
     join,
 )
+from composer.python_source.annotations import dotted_name
 from composer.python_source.changed_names import ALL, NOTHING
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from composer.inference.classes.attribute_stores import AttributeStore
 
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # What a class and a function have that tells their name.
 CLASS_NAMES = ('__name__', '__qualname__')
+# Decorators that give a class no attributes but special ones.
+_DECORATORS = {'dataclass', 'final', 'unique', 'total_ordering', 'runtime_checkable', 'verify'}
+_OF_ENUMERATIONS = {'name', 'value', '_name_', '_value_'}
+
+
+class _NamedTuple(NamedTuple):
+    """One without fields, for what all of them have."""
+
+
 # What an object keeps, wherever else something is stored in it.
 _LASTING = (
     Primitive,
@@ -240,6 +254,24 @@ class Classes(Part):
                 return stored
         return UNKNOWN if owner.is_shared else join(map(_widen, alternatives(stored)))
 
+    def explain_missing(self, of: Class, name: str) -> tuple[str, str, str | None] | None:
+        """Return the problem of an attribute that nothing gives to a class or to its objects."""
+        line = [each for each in self.bodies.line_of(of) if isinstance(each, Class)]
+        given = {each for one in line for each in _attributes_given(one.definition)}
+        if name.startswith('__') or name in given or self._every_store(name):
+            return None
+        own = any(self.bodies.find(of, each) for each in (name, '__getattr__', '__getattribute__'))
+        bases = self.bodies.externals(of)
+        if own or not all(_is_plain(each.definition) for each in line):
+            return None
+        if self.enumerations.is_one(of) and name in _OF_ENUMERATIONS:
+            return None
+        if 'types.SimpleNamespace' in bases or any(_has(each, name) for each in bases):
+            return None
+        known = [each for each in given if not each.startswith('__')]
+        text = f"'{of.definition.name}' has no attribute '{name}'"
+        return 'unknown-attribute', text, suggest(name, known)
+
     def _is_changed_inside(self, owner: Instance, name: str, stored: Value) -> bool:
         held = [each for each in alternatives(stored) if isinstance(each, Mapping | Sequence)]
         # It may have other names.
@@ -299,6 +331,27 @@ class Classes(Part):
     def fields_of(self, owner: Instance) -> dict[str, tuple[Value, Place]] | None:
         """Return the fields of an object of a dataclass or named tuple, and their places."""
         return self.fields.fields_of(owner)
+
+
+def _attributes_given(definition: ast.ClassDef) -> Iterator[str]:
+    """Yield the names that the body of a class declares or stores, and those of its slots."""
+    for node in ast.walk(definition):
+        match node:
+            case ast.Attribute(attr=name, ctx=ast.Store()) | ast.Constant(value=str(name)):
+                yield name
+            case ast.Name(id=name, ctx=ast.Store()):
+                yield name
+
+
+def _has(base: str, name: str) -> bool:
+    """Return whether a class of Python has an attribute."""
+    return hasattr(_NamedTuple if base == 'typing.NamedTuple' else locate(base), name)
+
+
+def _is_plain(definition: ast.ClassDef) -> bool:
+    """Return whether nothing gives a class further attributes."""
+    words = {dotted_name(getattr(each, 'func', each)) for each in definition.decorator_list}
+    return {each.rpartition('.')[2] for each in words} <= _DECORATORS
 
 
 def _method(function: Function, home: Class, owner: Value | None) -> Function:

@@ -164,13 +164,19 @@ class Attributes(Part):
                 return BoundMethod(owner, name)
             case Instance():
                 self._evaluator.run.moves += name in owner.attributes
-                return (
-                    owner.of if name == '__class__' else self._evaluator.classes.read(owner, name)
+                if name == '__class__':
+                    return owner.of
+                is_whole = name not in owner.attributes and not owner.is_open
+                problem = (
+                    self._evaluator.classes.explain_missing(owner.of, name) if is_whole else None
                 )
+                return problem or self._evaluator.classes.read(owner, name)
             case Class():
                 if name == '__subclasses__':
                     return BoundMethod(owner, name)
-                return self._evaluator.classes.class_attribute(owner, name, None) or UNKNOWN
+                classes = self._evaluator.classes
+                problem = None if hasattr(type, name) else classes.explain_missing(owner, name)
+                return problem or classes.class_attribute(owner, name, None) or UNKNOWN
             case Super(of=of, owner=Instance() | Class() as mine):
                 whole = mine.of if isinstance(mine, Instance) else mine
                 found = self._evaluator.classes.class_attribute(whole, name, mine, of)

@@ -26,6 +26,7 @@ from composer.inference.values import (
     chosen_by,
     is_chosen,
 )
+from composer.spelling import suggest
 
 
 class Containers(Part):
@@ -103,6 +104,15 @@ class Containers(Part):
         """Store an entry of a dictionary."""
         self._evaluator.run.changes += 1
         owner.set(key, value, place, self._evaluator.run.conditions)
+
+    def check_key(self, owner: Value, key: Value, place: Place) -> None:
+        """Report a key that a dictionary does not have, if all that it has is known."""
+        match owner, key:
+            case Mapping(is_lost=False, is_open=False, entries=entries), Constant(value=value):
+                if entries and value not in entries:
+                    help_text = suggest(value, entries, 'it has')
+                    text = f'there is no key {value!r}'
+                    self._evaluator.run.report('bad-index', place, text, help_text)
 
     def check_index(self, owner: Value, index: Value, place: Place) -> None:
         """Report an index that an array or sequence does not have, whatever is in it."""

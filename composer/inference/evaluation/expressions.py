@@ -334,6 +334,7 @@ class Expressions(Part):
             return self._evaluator.top_value(scope.module, index.value) if is_known else UNKNOWN
         is_slice = isinstance(node.slice, _UNREAD)
         place = Place(scope.module, node.slice)
+        self._evaluator.containers.check_key(owner, index, place)
         return join(
             self._item(each, index, place, is_slice=is_slice) for each in alternatives(owner)
         )

@@ -13,6 +13,7 @@ from composer.inference.message_types import in_python
 from composer.inference.values import (
     Alternatives,
     ArrayField,
+    Awaitable,
     Class,
     Constant,
     External,
@@ -268,7 +269,10 @@ class _Fit:
     def _compare(
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
-        if field_type.array:
+        if isinstance(value, Awaitable):
+            text = 'this is a coroutine, which has not been awaited'
+            yield self._misfit('missing-await', text, place, path, 'put await before the call')
+        elif field_type.array:
             yield from self._array(field_type, value, place, path)
         elif field_type.nested:
             yield from self.message(field_type.nested, value, place, path)

@@ -50,6 +50,7 @@ from types import SimpleNamespace
 import copy
 import dataclasses
 import datetime
+import enum
 import functools
 import itertools
 import math
@@ -84,6 +85,11 @@ class Turn:
     angul: dict  # of VARS
 
 
+class Gear(enum.IntEnum):
+    LOW = 1
+    HIGH = 2
+
+
 Move = namedtuple('Move', 'linear angul')  # of ASDICT
 
 
@@ -95,6 +101,10 @@ def nested(depth):
 
 def poses(node):
     return node.call('plan', {}).plan.poses
+
+
+def fill(gains):
+    getattr(gains, 'update')({'d': 0.1})
 
 
 def pass_on(node, name, payload):
@@ -111,6 +121,12 @@ def odometry(node):
     return {'pose': {'pose': {'position': {'x': 1.0}}}}
 """
 WRONG = {
+    # what classes and dictionaries of the project have not
+    'print(Turn(linear={}, angul={}).angular)': 'unknown-attribute',
+    'print(Keeper(node).nodes)': 'unknown-attribute',
+    'print(Gear.LOWER)': 'unknown-attribute',
+    'print(Gear(3))': 'bad-call',
+    "print({'p': 1.0, 'i': 0.1}['d'])": 'bad-index',
     # names, however they are reached
     "print(node.state['distance'])": 'unknown-attribute',
     "node.state['distance'] = 1.0": 'unknown-attribute',
@@ -315,6 +331,14 @@ WRONG = {
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    'print(Turn(linear={}, angul={}).angul)',
+    'keeper = Keeper(node); keeper.speed = 1; print(keeper.speed)',
+    'keeper = Keeper(node); setattr(keeper, m.child_frame_id, 1); print(keeper.speed)',
+    'print(Gear.LOW.name, Gear.LOW.value, Gear(2), Gear.__members__, Gear.mro())',
+    "gains = {'p': 1.0}; gains['d'] = 0.1; print(gains['d'])",
+    "gains = defaultdict(float, p=1.0); print(gains['d'])",
+    "gains = {'p': 1.0}; fill(gains); print(gains['d'])",
+    "try:\n    print({'p': 1.0}['d'])\nexcept KeyError:\n    pass",
     'if type(m).__module__ == node.parameters.mode: print(m.velocity)',
     "if m.__class__.__module__.startswith('geometry'): print(m.velocity)",
     "if 'Twist' in str(type(m)): print(m.velocity)",
@@ -592,6 +616,7 @@ UNANSWERED = {
     f'if request.data: {GIVES}': 1,
     f'if request.data: {GIVES}\n    elif request: print()\n    else: {GIVES}': 1,
     f'try: {GIVES}\n    except OSError: pass': 1,
+    f'try: {GIVES}\n    except OSError: return': 3,
     f'for x in open("x"): {GIVES}': 1,
     f'while request.data: {GIVES}': 1,
     f'match request.data:\n        case True: {GIVES}': 1,
@@ -614,6 +639,23 @@ ANSWERED = (
 @pytest.mark.parametrize(('body', 'line'), UNANSWERED.items(), ids=UNANSWERED)
 def test_a_way_without_a_response_is_found(check, body, line):
     assert check(ANSWER, f'def use(node, request):\n    {body}\n') == [(line, 'field-type')]
+
+
+# Ways that a parameter, an exception or a helper decides.
+DOUBTFUL = {
+    f'if node.parameters.on: {GIVES}': 1,
+    f'if node.name == "switch": {GIVES}': 1,
+    f'def answer(ok):\n        if ok: {GIVES}\n    return answer(request.data)': 4,
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(('body', 'line'), DOUBTFUL.items(), ids=DOUBTFUL)
+def test_a_way_that_may_give_no_response_is_a_warning(check, body, line):
+    system = ANSWER.replace('    services', '    parameters: {on: true}\n    services')
+    code = f'def use(node, request):\n    {body}\n'
+    found = [each for each in check(system, code) if each[1] != 'unused-parameter']
+    assert found == [(line, 'missing-return')]
 
 
 @pytest.mark.ros

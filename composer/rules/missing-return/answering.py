@@ -1,0 +1,3 @@
+def answer(node, request):
+    if node.parameters.enabled:
+        return {'success': True, 'message': 'done'}

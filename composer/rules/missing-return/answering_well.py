@@ -1,0 +1,4 @@
+def answer(node, request):
+    if node.parameters.enabled:
+        return {'success': True, 'message': 'done'}
+    return {'success': False, 'message': 'disabled'}
