@@ -241,6 +241,7 @@ class LocalPart:
         """Let the behaviours be called of the nodes that have started."""
         prompt, self._prompt = self._prompt, []
         self._starter.open(prompt)
+        self.state.is_open = True
 
     def start_waiting(self) -> None:
         """Start what waits for something.
@@ -339,7 +340,9 @@ class LocalPart:
 
         A component is unloaded and loaded.
         """
-        if full_name in self._nodes:
+        if not self.state.is_up and full_name in self.list_hidden():
+            failure = f"node '{full_name}' has not started yet"
+        elif full_name in self._nodes:
             failure = self._restarter.restart(full_name)
         else:
             with self._restarter.lock:

@@ -95,7 +95,7 @@ class Starter:
             components: Those to load into containers that run.
         """
         own = [each for each in processes if not each.spec.on_demand]
-        waiters = list_waiters(nodes, own, self._start_late, self._processes.start)
+        waiters = self._list_late(nodes, own)
         waiters += self.components.waiters(processes)
         return waiters + [self.components.waiter(*each) for each in components]
 
@@ -113,7 +113,7 @@ class Starter:
         Raises:
             StartError: It could not start.
         """
-        waiters = list_waiters([], [process], self._start_late, self._processes.start)
+        waiters = self._list_late([], [process])
         if waiters:
             self._waiting_starter().start_all(waiters, self._system.stop)
         else:
@@ -207,6 +207,18 @@ class Starter:
             self._nodes,
             self._system.elsewhere,
             self._system.positions,
+        )
+
+    def _list_late(
+        self, nodes: Iterable[LiveNode], processes: Iterable[ExternalProcess]
+    ) -> list[Waiter]:
+        # A reload may have removed or replaced a node that waits.
+        return list_waiters(
+            nodes,
+            processes,
+            self._start_late,
+            self._processes.start,
+            lambda node: self._nodes.get(node.spec.full_name) is node,
         )
 
     def _start_late(self, node: LiveNode) -> None:

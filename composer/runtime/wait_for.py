@@ -253,8 +253,13 @@ def list_waiters(
     processes: Iterable[ExternalProcess],
     start_node: Callable[[LiveNode], None],
     start_process: Callable[[ExternalProcess], None],
+    is_wanted: Callable[[LiveNode], bool],
 ) -> list[Waiter]:
-    """Return those of the nodes and processes that have conditions or a delay."""
+    """Return those of the nodes and processes that have conditions or a delay.
+
+    Args:
+        is_wanted: Whether a node is still to start.
+    """
     waiting_processes = [each for each in processes if each.spec.starts_late]
     waiting_nodes = [each for each in nodes if each.spec.starts_late]
     return [
@@ -266,7 +271,7 @@ def list_waiters(
                 partial(_resolve_of_process, process.spec),
                 partial(_log_of_process, process.spec),
                 partial(start_process, process),
-                partial(_is_wanted, process),
+                partial(_is_process_wanted, process),
             )
             for process in waiting_processes
         ),
@@ -278,14 +283,14 @@ def list_waiters(
                 partial(_resolve_of_node, node),
                 node.ros.get_logger().info,
                 partial(start_node, node),
-                lambda: True,
+                partial(is_wanted, node),
             )
             for node in waiting_nodes
         ),
     ]
 
 
-def _is_wanted(process: ExternalProcess) -> bool:
+def _is_process_wanted(process: ExternalProcess) -> bool:
     return not process.is_leaving
 
 

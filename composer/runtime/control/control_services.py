@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from composer.runtime.health.deliveries import Deliveries
 
 
+_STARTING = 'the system is still starting'
+
+
 class AskedWorkers(Protocol):
     """The workers of a system that is asked."""
 
@@ -110,12 +113,8 @@ class ControlServices:
             (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries),
             (protocol.DOWN, self._stop_system, queries),
             (protocol.PLAN, lambda: commands.plan(system), changes),
-            (protocol.RELOAD, lambda: self._when_up(lambda: commands.reload(system)), changes),
-            (
-                protocol.RELOAD_NOW,
-                lambda: self._when_up(lambda: commands.reload_now(system)),
-                queries,
-            ),
+            (protocol.RELOAD, lambda: self._reload(commands.reload), changes),
+            (protocol.RELOAD_NOW, lambda: self._reload(commands.reload_now), queries),
         )
         for name, answer, group in services:
             node.create_service(
@@ -137,16 +136,20 @@ class ControlServices:
     def _serve_restart(self, request: Any, response: Any) -> Any:
         names = {each.name: each.value.string_value for each in request.parameters}
         name = names.get('node', '')
-        outcome = _attempt(lambda: self._when_up(lambda: self._restart(name)))
+        outcome = _attempt(lambda: self._restart(name))
         response.result.successful, response.result.reason = outcome.succeeded, outcome.text
         return response
 
-    def _when_up(self, answer: Callable[[], Outcome]) -> Outcome:
-        if self._system.state.is_up:
-            return answer()
-        return Outcome(succeeded=False, text='the system is still starting')
+    def _reload(self, reload: Callable[[Any], Outcome]) -> Outcome:
+        state = self._system.state
+        # Workers take no edit before all that is in them has started.
+        if state.is_up or (state.is_open and not self._system.workers.describe()):
+            return reload(self._system)
+        return Outcome(succeeded=False, text=_STARTING)
 
     def _restart(self, name: str) -> Outcome:
+        if not self._system.state.is_open:
+            return Outcome(succeeded=False, text=_STARTING)
         if name not in (*self._system.list_nodes(), *self._system.list_components()):
             return Outcome(succeeded=False, text=f"the system has no node '{name}'")
         return self._system.restart_node(name)

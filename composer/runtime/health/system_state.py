@@ -63,6 +63,7 @@ class SystemState:
         file: Its file, as the user wrote it.
 
     Attributes:
+        is_open: Whether its behaviours run; what waits may not have started.
         is_up: Whether it has started.
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
@@ -73,6 +74,7 @@ class SystemState:
     def __init__(self, name: str, file: str) -> None:
         self.name = name
         self.file = os.path.abspath(file) if os.path.exists(file) else file  # noqa: PTH100, PTH110 - as written
+        self.is_open = False
         self.is_up = False
         self.is_stopping = False
         self.last_reload: ReloadReport | None = None

@@ -52,6 +52,30 @@ def composer(capsys, monkeypatch, domain_id):
     return call
 
 
+def test_what_runs_takes_commands_while_others_wait(compose, composer, wait_for):
+    text = (
+        SYSTEM.replace('stuck:\n', 'stuck:\n    delay: 3600\n')
+        + 'processes: {late: {command: [sleep, "3600"], delay: 3600}}\n'
+    )
+    child = compose(text, CODE)
+    child.wait_for_line('count 1')
+    assert composer('restart', 'arm') == (0, "system: node '/robot/arm' was restarted\n", '')
+    assert "system: node '/stuck' has not started yet" in composer('restart', 'stuck')[2]
+
+    # What is gone is waited for no more.
+    edited = text.replace('0.05', '0.04').replace('late:', 'later:').replace('3600}}', '0.1}}')
+    (compose.folder / 'system.yaml').write_text(
+        edited.replace('stuck:', 'quick:').replace(
+            'quick:\n    delay: 3600', 'quick:\n    delay: 0.1'
+        )
+    )
+    code, output, errors = composer('reload')
+    assert (code, errors) == (0, '')
+    assert 'reloaded in ' in output
+    child.wait_until_ready()
+    assert child.stop() == 0
+
+
 def test_a_running_system_answers(compose, composer, monkeypatch):
     """Ask it all, in the order in which a user might."""
     child = compose(SYSTEM, CODE)
