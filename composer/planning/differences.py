@@ -88,6 +88,8 @@ _LOST = {
     'actions': 'results not fetched yet',
     'action_clients': 'the results of goals in flight',
 }
+# With another one of these, a subscription has no use for what waits.
+_OTHER_MESSAGES = {'topic', 'type', 'raw', 'content_filter'}
 # One that is recreated keeps it.
 _WITH_OWN_STATE = ('subscriptions', 'timers', 'services', 'actions')
 _ENTITIES = {
@@ -502,6 +504,7 @@ def _modification(
     )
     reason = next(filter(None, reasons), '')
     keys = dict.fromkeys(each.top_key for each in changes)
+    keeps_queue = target[1] == 'subscriptions' and not keys.keys() & _OTHER_MESSAGES
     at_start = _AT_ITS_START if rules is not _PROCESSES else ('wait_for', 'delay')
     late = [key for key in keys if key in at_start and not reason]
     return Operation(
@@ -512,7 +515,7 @@ def _modification(
         span,
         tuple(changes),
         reason,
-        (rules.lost,) if reason else (),
+        (rules.lost,) if reason and not keeps_queue else (),
         tuple(f'{key} counts from its next start' for key in late),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from contextlib import suppress
 from typing import Any
@@ -22,13 +23,15 @@ class Inbox:
         overruns: How many were pushed out.
     """
 
-    __slots__ = ('depth', 'messages', 'overruns', 'source')
+    __slots__ = ('_heir', '_passing_on', 'depth', 'messages', 'overruns', 'source')
 
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque(maxlen=depth)
         self.source: Any = None
         self.overruns = 0
+        self._heir: Inbox | None = None
+        self._passing_on = threading.RLock()
 
     def put(self, message: Any) -> None:
         """Hand over a message, which is the receiver's from now on."""
@@ -36,9 +39,18 @@ class Inbox:
         if len(messages) == self.depth:
             self.overruns += 1
         messages.append(message)
+        if self._heir is not None:
+            self.pass_on(self._heir)
         source = self.source
         if source is not None:
             source.parts.scheduler.add_events(source, 0)
+
+    def pass_on(self, heir: Inbox) -> None:
+        """Move what waits to the end of another queue, and all that is still put here."""
+        self._heir = heir
+        with self._passing_on, suppress(IndexError):
+            while True:
+                heir.put(self.messages.popleft())
 
     def limit_beside(self, others: int) -> None:
         """Push out the oldest, so that there are no more than the depth with `others`."""

@@ -31,6 +31,8 @@ class Subscription:
     Attributes:
         ros: The rclpy subscription.
         events: Its behaviours for QoS events.
+        predecessor: The subscription of the same messages in whose place it comes, until
+            `take_over`.
     """
 
     def __init__(self, node: LiveNode, spec: SubscriptionSpec) -> None:
@@ -52,12 +54,39 @@ class Subscription:
             **_filter_options(spec),
         )
         node.endpoints.append(self._endpoint)
+        self.predecessor = self._find_predecessor(spec)
         self._rest(spec)
         self._local = node.system.topics.add_subscription(
-            node.ros, self.ros, read_only=spec.read_only, reason=_why_sent(spec)
+            node.ros,
+            self.ros,
+            read_only=spec.read_only,
+            reason=_why_sent(spec),
+            waits=self.predecessor is not None,
         )
         self.events.change(events_of(spec), spec)
-        node.count_missed(self._owner, self.ros, self._local.inbox)
+        if self.predecessor is None:
+            node.count_missed(self._owner, self.ros, self._local.inbox)
+
+    def _find_predecessor(self, spec: SubscriptionSpec) -> Subscription | None:
+        before = self._node.entities['subscriptions'].get(spec.name)
+        if not isinstance(before, Subscription):
+            return None
+        mine, its = self.ros, before.ros
+        is_same = (
+            (mine.topic_name, mine.msg_type, mine.raw) == (its.topic_name, its.msg_type, its.raw)
+            and spec.content_filter == before._spec.content_filter  # noqa: SLF001 (of this class)
+        )
+        return before if is_same else None
+
+    def take_over(self) -> None:
+        """Get what waits for the predecessor, once and in order, and destroy it.
+
+        No callback of either may begin meanwhile.
+        """
+        before, self.predecessor = self.predecessor, None
+        assert before is not None  # noqa: S101 - who calls this has seen it
+        self._node.system.topics.replace_subscription(before._local, self._local, before._end)  # noqa: SLF001
+        self._node.count_missed(self._owner, self.ros, self._local.inbox)
 
     def change(self, spec: SubscriptionSpec) -> None:
         """See `LiveEntity`."""
@@ -69,10 +98,13 @@ class Subscription:
 
     def destroy(self) -> None:
         """See `LiveEntity`."""
+        self._node.system.topics.remove_subscription(self._local)
+        self._end()
+
+    def _end(self) -> None:
         self.events.destroy()
         self._node.endpoints.remove(self._endpoint)
         self._node.overrides.drop(self._spec, publishes=False)
-        self._node.system.topics.remove_subscription(self._local)
         self._node.ros.destroy_subscription(self.ros)
 
     def _rest(self, spec: SubscriptionSpec) -> None:
@@ -138,7 +170,7 @@ def _filter_options(spec: SubscriptionSpec) -> dict[str, Any]:
 
 
 def _protecting(protect: Callable[[Any], None], call: BehaviourCall) -> Callable[[Any], Any]:
-    """Return a callback that gets messages without leave to write to their NumPy arrays."""
+    """Return a callback that gets messages without leave to write to their arrays of numbers."""
 
     def receive(message: Any) -> Any:
         protect(message)

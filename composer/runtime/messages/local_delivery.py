@@ -29,7 +29,7 @@ from composer.runtime.messages.delivery_policies import (
 from composer.runtime.messages.ownership import ownership_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from rclpy.publisher import Publisher as RosPublisher
     from rclpy.subscription import Subscription as RosSubscription
@@ -99,7 +99,9 @@ class LocalPublisher:
         matched = [each for each in subscriptions if are_compatible(profile, each.ros.qos_profile)]
         # Nothing is handed over meanwhile: the middleware never counts so few.
         self._size = _NOWHERE
-        inboxes = [(each, each.inbox) for each in matched if each.inbox is not None]
+        inboxes = [
+            (each, each.inbox) for each in matched if each.inbox is not None and not each.waits
+        ]
         self._receivers = (
             tuple(inbox for each, inbox in inboxes if not each.read_only),
             tuple(inbox for each, inbox in inboxes if each.read_only),
@@ -193,16 +195,25 @@ class LocalSubscription:
         inbox: Takes its messages; `None` if there is a reason to send them.
         reason: Why messages for it are sent.
         read_only: Whether it shares messages with others.
+        waits: Whether another one gets its messages until it is replaced.
     """
 
     def __init__(
-        self, node: Any, ros: RosSubscription, inbox: Inbox | None, reason: str, *, read_only: bool
+        self,
+        node: Any,
+        ros: RosSubscription,
+        inbox: Inbox | None,
+        reason: str,
+        *,
+        read_only: bool,
+        waits: bool = False,
     ) -> None:
         self.node = node
         self.ros = ros
         self.inbox = inbox
         self.reason = reason
         self.read_only = read_only
+        self.waits = waits
 
 
 class _Topic:
@@ -214,6 +225,16 @@ class _Topic:
         """Find out to which subscriptions each publisher hands over."""
         for publisher in self.publishers:
             publisher.connect(self.subscriptions)
+
+
+def _take_all(ros: RosSubscription) -> Iterator[tuple[Any, tuple[int, int]]]:
+    """Yield the messages that wait in the middleware, with what tells them from others."""
+    for _ in range(_MOST_KEPT):
+        taken = ros.handle.take_message(ros.msg_type, ros.raw)
+        if taken is None:
+            return
+        message, info = taken
+        yield message, (info['source_timestamp'], info['publication_sequence_number'])
 
 
 class LocalTopics:
@@ -253,17 +274,26 @@ class LocalTopics:
             publisher.connect(self._topic(publisher.ros).subscriptions)
 
     def add_subscription(
-        self, node: Any, ros: RosSubscription, *, read_only: bool = False, reason: str = ''
+        self,
+        node: Any,
+        ros: RosSubscription,
+        *,
+        read_only: bool = False,
+        reason: str = '',
+        waits: bool = False,
     ) -> LocalSubscription:
         """Take in a subscription of the rclpy node `node`.
 
         Args:
             reason: Why only the middleware can deliver to it; empty if that is not so.
+            waits: Whether `replace_subscription` gives it another one's messages later.
         """
         reason = reason or why_sent(ros.qos_profile)
         depth = queue_depth(ros.qos_profile)
-        inbox = None if reason else self._executor.open_inbox(node, ros, depth)
-        subscription = LocalSubscription(node, ros, inbox, reason, read_only=read_only)
+        inbox = None if reason and not waits else self._executor.open_inbox(node, ros, depth)
+        subscription = LocalSubscription(
+            node, ros, inbox, reason, read_only=read_only, waits=waits
+        )
         with self._lock:
             topic = self._topic(ros)
             topic.subscriptions.append(subscription)
@@ -305,6 +335,36 @@ class LocalTopics:
         with self._lock:
             topic = self._topic(subscription.ros)
             topic.subscriptions.remove(subscription)
+            topic.connect()
+
+    def replace_subscription(
+        self, old: LocalSubscription, new: LocalSubscription, destroy: Callable[[], None]
+    ) -> None:
+        """Let a subscription that waits get what another one has not run yet, once, in order.
+
+        Until the last step, what is handed over goes by the queue of the old one.
+
+        Args:
+            destroy: Destroys the old one's rclpy subscription. After that the middleware has given
+                the new one all that it gave the old one since both were there.
+        """
+        inbox = new.inbox
+        assert inbox is not None  # noqa: S101 - it waits
+        if old.inbox is not None:
+            old.inbox.source = None  # Who has sent goes on to send.
+            old.inbox.pass_on(inbox)
+        seen = set()
+        for message, key in _take_all(old.ros):
+            seen.add(key)
+            inbox.put(message)
+        destroy()
+        for message, key in _take_all(new.ros):
+            if key not in seen:
+                inbox.put(message)
+        with self._lock:
+            topic = self._topic(new.ros)
+            topic.subscriptions.remove(old)
+            new.waits = False
             topic.connect()
 
     def forget(self, node: Any) -> None:

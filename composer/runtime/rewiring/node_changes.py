@@ -13,6 +13,7 @@ from composer.errors import StartError
 from composer.planning.plan import COMING, Action
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.entities.parameters import PARAMETER_HOOKS
+from composer.runtime.entities.subscriptions import Subscription
 from composer.runtime.logs import set_level
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
@@ -109,7 +110,6 @@ class NodeChange:
             return
         if before is not None:
             transaction.on_undo(entities.__setitem__, name, before)
-            transaction.on_commit(before.destroy)
         if operation.action in COMING:
             transaction.on_undo(node.limits.update, node.limits_of(operation.noun, name))
             transaction.on_undo(node.drop_limits, operation.noun, name)
@@ -120,6 +120,11 @@ class NodeChange:
                 transaction.on_commit(_start_timer, node, created)
             transaction.on_undo(entities.pop, name, None)
             entities[name] = created
+            if isinstance(created, Subscription) and created.predecessor is not None:
+                before = None
+                transaction.on_replace(created.take_over)
+        if before is not None:
+            transaction.on_replace(before.destroy)
         if operation.action is Action.REMOVE:
             entities.pop(name, None)
             transaction.on_commit(node.forget, operation.noun, name)

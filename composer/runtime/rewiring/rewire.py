@@ -125,6 +125,8 @@ class Rewiring:
 
     def commit(self) -> None:
         """Let go of what was there before."""
+        # Both ends would run what comes as soon as behaviours may begin.
+        self._transaction.replace()
         # Before nodes are removed, which may take long.
         self._go_on()
         self._transaction.commit()
