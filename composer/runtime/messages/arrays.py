@@ -44,6 +44,11 @@ def is_numpy_array(field_type: FieldType) -> bool:
     return field_type.array == 'fixed' and field_type.kind in _TYPE_CODES
 
 
+def is_number_array(field_type: FieldType) -> bool:
+    """Tell whether a field has an array of numbers, of NumPy or an `array.array`."""
+    return field_type.array is not None and field_type.kind in _TYPE_CODES
+
+
 def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
     """Return the function that reads arrays of a type.
 
@@ -102,6 +107,8 @@ def _copy_fast(kind: str, value: object) -> 'array[Any] | None':
     code = _TYPE_CODES[kind]
     if isinstance(value, list | tuple):
         return _copy_list(code, value)
+    if isinstance(value, memoryview) and value.format == code:
+        return array(code, value.tobytes())
     octets = _unpack(value) if isinstance(value, memoryview) else value
     if kind in OCTET_KINDS and isinstance(octets, bytes | bytearray):
         return array(code, octets)
