@@ -21,8 +21,9 @@ def read_schema_keys():
         for branch in (*part.get('anyOf', ()), *part.get('oneOf', ())):
             walk(branch, name, place)
         for key, inner in part.get('properties', {}).items():
-            places[f'{name}.{key}'].add((*place, key))
-            walk(inner, key, (*place, key))
+            if inner is not False:  # A key that may not be there.
+                places[f'{name}.{key}'].add((*place, key))
+                walk(inner, key, (*place, key))
         for each in ('items', 'additionalProperties'):
             if isinstance(part.get(each), dict):
                 walk(part[each], name, (*place, ANY))
