@@ -137,6 +137,7 @@ WRONG = [
     *(({**given, 'then': ''}, "[ nothing-expected: this case expects nothing, and passes whatever "
        "happens (write what it shows, or {error: '*', never: true})")
       for given in ({}, {'when': '{publish: /scan}'}, {'given': '{services: {/dock: {}}}'})),
+    ({'when': '{call: 5}', 'then': ''}, '5 wrong-type: expected a string, got 5'),
     ({'then': '{topic: /speed, never: "false"}'},
      '"false" nothing-expected: this is the same for every message (name a field)'),
     ({'then': '{parameters: {robot: {}}}'}, '{ out-of-range: expected at least 1 key, got an empty mapping'),
