@@ -44,18 +44,18 @@ def ament_prefixes() -> list[Path]:
     """
     entries = [*shell_environment().get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
     prefixes = dict.fromkeys(Path(entry) for entry in entries if entry)
-    return [each for each in prefixes if not os.path.exists(each / BUILD_MANIFEST)]  # noqa: PTH110
+    return [each for each in prefixes if not os.path.exists(each / BUILD_MANIFEST)]
 
 
 def find_package(package: str, prefixes: Iterable[Path], index: str) -> Path | None:
     """Return the first of the prefixes whose index lists a package, or `None`."""
-    return next((each for each in prefixes if (each / index / package).is_file()), None)
+    return next((each for each in prefixes if os.path.isfile(each / index / package)), None)
 
 
 def find_path(relative: str, prefixes: Iterable[Path]) -> Path | None:
     """Return a file or folder in the first prefix that has it, or `None`."""
     candidates = (prefix / relative for prefix in prefixes)
-    return next((path for path in candidates if path.exists()), None)
+    return next((path for path in candidates if os.path.exists(path)), None)
 
 
 def find_share(package: str) -> Path | None:
@@ -113,9 +113,11 @@ def list_executables(package: str) -> list[Path]:
     """Return the programs that a package has installed for `ros2 run`."""
     prefix = find_package(package, ament_prefixes(), PACKAGE_INDEX)
     folder = prefix / 'lib' / package if prefix else None
-    if folder is None or not folder.is_dir():
+    if folder is None or not os.path.isdir(folder):
         return []
-    return sorted(path for path in folder.iterdir() if path.is_file() and os.access(path, os.X_OK))
+    return sorted(
+        path for path in folder.iterdir() if os.path.isfile(path) and os.access(path, os.X_OK)
+    )
 
 
 def list_components(package: str) -> list[str]:

@@ -127,7 +127,7 @@ def explain_missing(
         return str(found) if base is None else os.path.relpath(found, base)
 
     lineage = [path, *path.parents]
-    found = next((i for i, at in enumerate(lineage) if os.path.isdir(at)), 0)  # noqa: PTH112
+    found = next((i for i, at in enumerate(lineage) if os.path.isdir(at)), 0)
     folder, missing = lineage[found], lineage[found - 1]
     try:
         entries = sorted(folder.iterdir()) if found else []
@@ -135,14 +135,14 @@ def explain_missing(
         return None
     entries = [each for each in entries if not each.name.startswith('.')]
     if missing != path:
-        folders = {each.name: each for each in entries if each.is_dir()}
+        folders = {each.name: each for each in entries if os.path.isdir(each)}
         if near := find_nearest(missing.name, folders):
             return did_you_mean(shown(folders[near] / path.relative_to(missing)))
         return suggest('', folders, f"the folders in '{shown(folder)}' are")
     if is_folder:
-        names = [shown(each) for each in entries if each.is_dir()]
+        names = [shown(each) for each in entries if os.path.isdir(each)]
         return suggest(shown(path), names, 'there are')
-    inside = next((each / path.name for each in entries if (each / path.name).is_file()), None)
+    inside = next((each / path.name for each in entries if os.path.isfile(each / path.name)), None)
     if inside:
         return did_you_mean(shown(inside))
     # All have the same suffix, which makes them no more alike.

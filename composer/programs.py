@@ -78,7 +78,7 @@ def find_program_problem(
         help_text = did_you_mean(_find_near(program, search_path))
         return f"there is no program '{program}' on the PATH", help_text
     path = folder / program
-    if not path.is_file():
+    if not os.path.isfile(path):
         return f"there is no program '{path}'", None
     if not os.access(path, os.X_OK):
         return f"'{path}' is not executable", f'chmod +x {path}'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
@@ -111,7 +112,7 @@ def _check_file(context: CheckContext, process: ProcessSpec, launch: str) -> Ite
         rule = 'missing-package' if is_package else 'missing-launch-file'
         yield context.at_value(at, rule, str(error), help=error.help)
         return
-    if path.is_file():
+    if os.path.isfile(path):
         yield from _check_arguments(context, process, path)
         return
     message = f"there is no launch file '{shown_path(path)}'"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from itertools import takewhile
 from pathlib import Path
@@ -136,7 +137,7 @@ def _check_folder(context: CheckContext, process: ProcessSpec) -> Iterator[Diagn
         at, help_text = (*process.path, 'cwd'), error.help
         yield context.at_value(at, 'uninstalled-package', str(error), help=help_text)
         return
-    if folder.is_dir():
+    if os.path.isdir(folder):
         return
     message = f"there is no folder '{process.cwd}' to run in"
     at = (*process.path, 'cwd')
@@ -155,9 +156,13 @@ def _check_script(context: CheckContext, process: ProcessSpec) -> Iterator[Diagn
     place = context.system.positions.value(path)
     # Without `cwd` it runs where the system is started: here, or beside the file.
     folders = [Path(process.cwd)] if process.cwd else [Path(), place.source.folder]
-    if script.name.startswith('-') or any((folder / script).exists() for folder in folders):
+    if script.name.startswith('-') or any(os.path.exists(folder / script) for folder in folders):
         return
-    if not folders[-1].is_dir() or is_in_package(process.cwd or '') or is_on_path(str(script)):
+    if (
+        not os.path.isdir(folders[-1])
+        or is_in_package(process.cwd or '')
+        or is_on_path(str(script))
+    ):
         return
     help_text = explain_missing(
         folders[-1] / script, None if script.is_absolute() else folders[-1]
@@ -171,12 +176,14 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
         return
     program = process.command[0]
     folder = Path(process.cwd or '.')
-    is_known = process.cwd is not None and folder.is_dir()
     at = (*process.path, 'command', 0)
+    is_known = process.cwd is not None and os.path.isdir(folder)
     if '/' in program and not (is_known or Path(program).is_absolute()):
         # Without `cwd` it is searched from where the system is started: here, or beside the file.
         beside = context.system.positions.value(at).source.folder
-        if process.cwd is None and not any((each / program).exists() for each in (folder, beside)):
+        if process.cwd is None and not any(
+            os.path.exists(each / program) for each in (folder, beside)
+        ):
             message = f"there is no program '{program}' here, where a system without 'cwd' runs it"
             help_text = explain_missing(beside / program, beside)
             yield context.at_value(at, 'missing-program', message, help=help_text)

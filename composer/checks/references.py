@@ -211,6 +211,6 @@ def _check_file(text: str, span: Span) -> Iterator[Diagnostic]:
         yield diagnostic_at(span, 'uninstalled-package', str(error), help=error.help)
         return
     # The functions of pathlib raise for names that are too long.
-    if not os.path.isfile(path):  # noqa: PTH113
+    if not os.path.isfile(path):
         message = f"there is no file '{shown_path(path)}'"
         yield diagnostic_at(span, 'missing-file', message, help=explain_absent(path, span))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 from composer.ament import explain_missing_package, find_share, list_packages
@@ -126,5 +127,7 @@ def _resolved(text: str, path: DataPath, positions: SourceMap) -> str:
 def _resolved_launch_file(text: str, path: DataPath, positions: SourceMap) -> str:
     """Return a launch file as `_resolved`; what is not beside the file is in a package."""
     beside = positions.value(path).source.folder / text
-    is_path = '/' not in text or text.startswith(('./', '../', '/', _PACKAGE)) or beside.exists()
+    is_path = (
+        '/' not in text or text.startswith(('./', '../', '/', _PACKAGE)) or os.path.exists(beside)
+    )
     return _resolved(text if is_path else f'{_PACKAGE}{text}', path, positions)

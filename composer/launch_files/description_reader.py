@@ -163,8 +163,8 @@ class DescriptionReader:
     def _description_of(self, source: Any, location: Text, values: list[tuple[str, Text]]) -> Any:
         """Return the description of an included file; `None` if its package is not here."""
         path = Path(location.text)
-        is_code = private(source, 'launch_description') is not None and not path.is_file()
-        if path.is_file() or is_code or not location.text:
+        is_code = private(source, 'launch_description') is not None and not os.path.isfile(path)
+        if os.path.isfile(path) or is_code or not location.text:
             if self.place.result.freeze(location):
                 what = 'which file is included depends on arguments'
                 self.place.remark(f'{what}; here {path.name}')

@@ -6,6 +6,7 @@ Only this file, and what runs launch files for `composer import --verify`, impor
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -180,7 +181,7 @@ class _Origins:
             entity, parser = original(cls, file)
             root = getattr(entity, '_Entity__xml_element', None)
             name = file if isinstance(file, str) else getattr(file, 'name', '')
-            if root is not None and Path(str(name)).is_file():
+            if root is not None and os.path.isfile(str(name)):
                 self._roots.append(root)  # an `id` is that of one object while it lives
                 numbers = _element_lines(Path(str(name)))
                 for element, line in zip(root.iter(), numbers, strict=False):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,7 +168,7 @@ class ParameterReader:
             self._place.result.freeze(path)
             read.files.append(NewFile(self._translated(data)))
             return
-        if Path(path.text).is_file() or not Path(path.text).parent.is_dir():
+        if os.path.isfile(path.text) or not os.path.isdir(Path(path.text).parent):
             read.files.append(path.written())
             if self._place.result.is_new_file(path.text):
                 self._keep_content(read, path)

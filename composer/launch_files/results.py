@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tempfile
 import time
@@ -118,7 +119,7 @@ class Imported:
             is_new = Path(path).stat().st_mtime >= self.started
         except (OSError, ValueError):
             return False
-        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and Path(path).is_file()
+        return is_new and path.startswith(f'{tempfile.gettempdir()}/') and os.path.isfile(path)
 
     def words(self, given: Mapping[str, str]) -> list[str]:
         """Return the arguments that the system is imported with, as on a command line."""

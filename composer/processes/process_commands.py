@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,7 +92,7 @@ def find_folder(spec: ProcessSpec) -> str | None:
     if spec.cwd is None:
         return None
     folder = _resolve(spec, spec.cwd)
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         message = f"process '{spec.name}': there is no folder '{folder}' to run in"
         raise StartError(message)
     return str(folder)
@@ -142,7 +143,7 @@ def _find_program(spec: ProcessSpec, environment: Mapping[str, str]) -> list[str
 
 def _find_file(spec: ProcessSpec, text: str, noun: str = 'parameter file') -> Path:
     path = _resolve(spec, text)
-    if not path.is_file():
+    if not os.path.isfile(path):
         message = f"process '{spec.name}': there is no {noun} '{path}'"
         raise StartError(message)
     # The process may have another working directory.

@@ -6,6 +6,7 @@ from time import monotonic, monotonic_ns, sleep
 from typing import TYPE_CHECKING, Any, Final
 
 from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -13,6 +14,8 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
+
+from composer.recordings.recorded_topics import RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -88,7 +91,7 @@ class RecordingPublisher:
             rate: How many times as fast as they were recorded.
 
         Raises:
-            RecordingError: The recording cannot be read on.
+            RecordingError: The recording cannot be read on, or a message is not of its type.
         """
         begun_ns, count = monotonic_ns(), 0
         for message in recording.raw_messages(self.topics, since_ns=since_ns):
@@ -98,7 +101,11 @@ class RecordingPublisher:
             due_ns = begun_ns + (message.time_ns - since_ns) / rate
             while (left_ns := due_ns - monotonic_ns()) > 0:
                 sleep(min(left_ns / _NANOSECONDS, _LONGEST_SLEEP_SEC))
-            publisher.publish(message.data)
+            try:
+                publisher.publish(message.data)
+            except _rclpy.RCLError as error:
+                text = f"a recorded message of '{message.topic.name}' is no {message.topic.type}"
+                raise RecordingError(text) from error
             count += 1
         return count
 

@@ -110,7 +110,7 @@ def read_recording(path: str | Path, *, is_bounded: bool = False) -> Recording:
 
 
 def _list_files(path: Path) -> list[Path]:
-    if not path.is_dir():
+    if not os.path.isdir(path):
         if not os.path.lexists(path):
             message = f"there is no recording '{path}'"
             raise RecordingError(message, help='name an MCAP file, or a folder of rosbag2')

@@ -85,7 +85,7 @@ def check_shell(of_file: Mapping[str, str]) -> None:
     keystore = os.environ.get(_KEYSTORE)
     if os.environ.get('ROS_SECURITY_ENABLE') == 'true' and keystore:
         enclaves = Path(keystore) / 'enclaves'
-        if not enclaves.is_dir():
+        if not os.path.isdir(enclaves):
             message = f"{_KEYSTORE}: there is no folder '{enclaves}'"
             raise StartError(message)
 

@@ -97,7 +97,7 @@ def find_file(document: Document, at: DataPath, text: str) -> Path | None:
         found = diagnostic_at(span, 'uninstalled-package', str(error), help=error.help)
         document.diagnostics.append(found)
         return None
-    if os.path.isfile(path):  # noqa: PTH113 - pathlib's raises for names that are too long
+    if os.path.isfile(path):
         return path
     help_text = explain_absent(path, span)
     message = f"there is no file '{path}'"

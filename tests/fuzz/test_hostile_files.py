@@ -55,3 +55,35 @@ def test_hostile_files_end_in_findings(name, tmp_path):
     code, output = run_limited(tmp_path)
     assert code == (1 if 'error[' in output else 0), output[-2000:]
     assert rules <= set(re.findall(r'(?:error|warning)\[([\w-]+)\]', output))
+
+
+LONG = {
+    'include': 'include: {a: {file: %s}}',
+    'parameter file': 'nodes: {a: {parameter_files: [%s]}}',
+    'read at start': 'args: {a: {file: %s}}',
+    'command': 'nodes: {a: {parameters: {b: {command: [cat, %s]}}}}',
+    'folder': 'processes: {a: {command: [python3, a.py], cwd: %s}}',
+    'script': 'processes: {a: {command: [python3, %s]}}',
+    'launch file': 'processes: {a: {launch: %s}}',
+    'of a package': 'processes: {a: {launch: "package://rclpy/%s"}}',
+    'NoDL of a package': 'processes: {a: {command: [sh], nodl: "package://rclpy/%s"}}',
+}
+
+
+@pytest.mark.parametrize('key', LONG)
+@pytest.mark.parametrize('command', ['check', 'show', 'graph'])
+def test_names_too_long_for_files_are_findings(key, command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ('x' * 300, 'd/' * 2500):
+        Path('a.yaml').write_text(f'version: 1\n{LONG[key] % name}\n')
+        run([command, 'a.yaml'])
+        assert 'bug in Composer' not in capsys.readouterr().err
+
+
+def test_a_text_that_is_repeated_without_end_is_not_computed(tmp_path):
+    (tmp_path / 'system.yaml').write_text('version: 1\nnodes: {a: {on_start: "m:f"}}\n')
+    (tmp_path / 'm.py').write_text(
+        'def f(node):\n    node.state.a = "a" * 10**10 + 10**10 * "b"\n'
+    )
+    code, output = run_limited(tmp_path)
+    assert code != 3, output[-2000:]

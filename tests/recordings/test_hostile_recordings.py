@@ -208,3 +208,33 @@ def test_a_replay_says_what_is_wrong(name, in_folder):
     assert code == 1, output
     assert expected in output
     assert written(in_folder) == before
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('size', ['string<=99999999999999999999', 'uint8[18446744073709551616]'])
+def test_sizes_that_no_memory_has_are_not_built(size, in_folder):
+    write_topics(Path('a.mcap'), kind='odd_msgs/msg/Odd', text=f'{size} a\n')
+
+    code, output = run_limited(in_folder, ['replay', 'a.mcap'], memory=600_000_000)
+
+    assert code == 1, output
+    assert "'/a' is not published" in output
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('start', ['0', '1e308', 'inf', 'nan'])
+def test_a_message_of_another_type_ends_a_replay(start, in_folder):
+    with Path('a.mcap').open('wb') as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema('std_msgs/msg/String', 'ros2msg', b'string data\n')
+        channel = writer.register_channel('/a', 'cdr', schema)
+        writer.add_message(channel, 5, b'\0\1\0\0\xff\xff\xff\xff', 5)
+        writer.finish()
+
+    words = ['replay', 'a.mcap', '--start', start]
+    code, output = run_limited(in_folder, words, memory=600_000_000)
+
+    if start == '0':
+        assert "error: a recorded message of '/a' is no std_msgs/msg/String" in output
+    assert code == (start == '0'), output

@@ -97,7 +97,7 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     if not words[0]:
         message = 'the file name is empty'
         raise UsageError(message, help='is a shell variable unset?')
-    if os.path.isdir(words[0]):  # noqa: PTH112 - pathlib's raises
+    if os.path.isdir(words[0]):
         raise _folder_error(words[0])
     count = 1
     while count < len(words) and _is_layer(words[count]):

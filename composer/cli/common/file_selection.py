@@ -122,7 +122,7 @@ def has_arguments(words: Sequence[str]) -> bool:
     These are `NAME:=VALUE`, and after a file what is no file, folder or pattern.
     """
     first, *others = words
-    is_one_file = first == _STANDARD_INPUT or os.path.isfile(first)  # noqa: PTH113 - pathlib's raises
+    is_one_file = first == _STANDARD_INPUT or os.path.isfile(first)
     return any(':=' in word or (is_one_file and _is_value(word)) for word in others)
 
 
@@ -177,7 +177,7 @@ def _is_value(word: str) -> bool:
 
 
 def _is_layer(word: str) -> bool:
-    if not word.endswith(_SUFFIXES) or not os.path.isfile(word):  # noqa: PTH113
+    if not word.endswith(_SUFFIXES) or not os.path.isfile(word):
         return False
     data = read_document(Path(word)).data
     if data is None or _find_near('version', {str(key): 0 for key in data}):
@@ -234,7 +234,7 @@ def _expand(word: str) -> Iterator[tuple[Path | None, bool]]:
             yield None, False
     for match in matches:
         path = Path(match)
-        if word == _STANDARD_INPUT or not os.path.isdir(path):  # noqa: PTH112 - pathlib's raises
+        if word == _STANDARD_INPUT or not os.path.isdir(path):
             yield path, word != _STANDARD_INPUT
             continue
         found = [
@@ -296,11 +296,11 @@ def walk_yaml_files(folder: Path) -> Iterator[Path]:
         )
         paths = (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
         # A pipe or a device is nobody's system.
-        yield from (path for path in paths if path.is_file() or not path.exists())
+        yield from (path for path in paths if os.path.isfile(path) or not os.path.exists(path))
 
 
 def _explain_nothing(word: str) -> Diagnostic:
-    if os.path.isdir(word):  # noqa: PTH112 - the word may not be a path
+    if os.path.isdir(word):
         return Diagnostic(
             'nothing-to-check',
             'no system in this folder',

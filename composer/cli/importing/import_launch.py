@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +51,7 @@ def import_launch_file(
     if path.suffix not in _ENDINGS:
         message = f"'{path}' is no launch file: it ends with none of {', '.join(_ENDINGS)}"
         raise UsageError(message)
-    if not path.is_file():
+    if not os.path.isfile(path):
         message = f"there is no file '{path}'"
         raise ComposerError(message)
     stem = output.stem if output else path.name.partition('.')[0]

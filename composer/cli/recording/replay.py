@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from composer.recordings.types import MessageTypes
 
 _NANOSECONDS = 10**9
+_LATEST_NS = 2**64
 # Each is a publisher.
 _MOST_TOPICS = 5000
 
@@ -78,7 +79,7 @@ def replay(
         topics_word = 'topic' if count == 1 else 'topics'
         terminal.info(f"replaying {count} {topics_word} of '{path}', {duration_sec:.1f} s")
         publisher.wait_for_subscriptions(of_all=waits)
-        since_ns = recording.start_ns + round(start_sec * _NANOSECONDS)
+        since_ns = recording.start_ns + round(min(_LATEST_NS, start_sec * _NANOSECONDS))
         count = publisher.publish(recording, since_ns, rate)
         while loops:
             count += publisher.publish(recording, since_ns, rate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,12 +67,12 @@ def check_case_names(file: SelectedFile, names: Sequence[str]) -> None:
 
 def _expand(word: str) -> Iterator[Path]:
     path = Path(word)
-    if path.is_dir():
+    if os.path.isdir(path):
         yield from (each for each in walk_yaml_files(path) if is_scenario(each))
-    elif path.exists():
+    elif os.path.exists(path):
         yield path
     elif glob.has_magic(word):
-        yield from (Path(each) for each in match_pattern(word) if Path(each).is_file())
+        yield from (Path(each) for each in match_pattern(word) if os.path.isfile(each))
     else:
         message = f"there is no file or folder '{word}'"
         raise UsageError(message, help=f'without one, {DEFAULT_PATTERN} is looked for')

@@ -130,7 +130,8 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     if isinstance(left, Constant) and isinstance(right, Constant):
         compute = ARITHMETIC.get(type(sign))
         is_power = isinstance(sign, _POWERS) and abs(hash(right.value)) > _GREATEST_POWER
-        if compute and not is_power and _is_small(left.value) and _is_small(right.value):
+        is_small = _is_small(left.value) and _is_small(right.value)
+        if compute and is_small and not is_power and not _is_repeated(sign, left, right):
             try:
                 return constant(compute(left.value, right.value), is_chosen=chosen)
             except (ArithmeticError, TypeError, ValueError):
@@ -189,6 +190,14 @@ def _is_small(value: object) -> bool:
     if isinstance(value, str):
         return len(value) < _LONGEST
     return isinstance(value, _NUMBERS) and (value != value or abs(value) < _GREATEST)  # noqa: PLR0124
+
+
+def _is_repeated(sign: ast.operator, left: Constant, right: Constant) -> bool:
+    """Return whether `text * number` is a longer text than is computed."""
+    if not isinstance(sign, ast.Mult) or str not in (left.kind, right.kind):
+        return False
+    sizes = [len(each.value) if each.kind is str else each.value for each in (left, right)]
+    return int in (left.kind, right.kind) and sizes[0] * sizes[1] > _LONGEST
 
 
 def _kind(value: Value) -> type | None:

@@ -23,8 +23,9 @@ from composer.spelling import did_you_mean, find_nearest
 _TYPE: Final = re.compile(
     r'(?P<base>[^<>=\[\]]+)(?P<bound><=[^<>=\[\]]*)?(?P<array>\[[^\[\]]*\])?',
 )
-_BOUND: Final = re.compile(r'<=[0-9]*[1-9][0-9]*')
-_ARRAY: Final = re.compile(r'\[((<=)?[0-9]*[1-9][0-9]*)?\]')
+# Generated code ends the process with sizes that no number of C can hold.
+_BOUND: Final = re.compile(r'<=0*[1-9][0-9]{0,8}')
+_ARRAY: Final = re.compile(r'\[((<=)?0*[1-9][0-9]{0,8})?\]')
 
 # C11 and C++17: the generated sources are compiled as both.
 _C_KEYWORDS: Final = """

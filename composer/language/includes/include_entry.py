@@ -153,8 +153,8 @@ def locate_file(text: str, place: Span) -> Path:
 def _is_there(path: Path) -> bool:
     """Return whether there is something to read, although reading may fail."""
     # The functions of pathlib raise for names that are too long.
-    leads_back = os.path.islink(path) and not os.path.exists(os.path.realpath(path))  # noqa: PTH110, PTH114
-    return (os.path.exists(path) or leads_back) and not os.path.isdir(path)  # noqa: PTH110, PTH112
+    leads_back = os.path.islink(path) and not os.path.exists(os.path.realpath(path))  # noqa: PTH114
+    return (os.path.exists(path) or leads_back) and not os.path.isdir(path)
 
 
 def _allowed(namespace: str) -> str:

@@ -5,6 +5,7 @@ Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -146,7 +147,7 @@ def _find_document(text: str, folder: Path) -> Path | None:
     scheme, _, rest = text.partition('://')
     if scheme == 'local':
         path = folder / rest
-        return path if path.is_file() else None
+        return path if os.path.isfile(path) else None
     package, _, name = rest.partition('/')
     if scheme != 'nodl' or not name:
         return None

@@ -76,7 +76,7 @@ class StartValueReader:
 
 
 def _files(value: StartValue) -> list[Path]:
-    return [path for path in value.named_files if path.exists()]
+    return [path for path in value.named_files if os.path.exists(path)]
 
 
 def _converted(value: StartValue, found: Any) -> Any:
@@ -109,7 +109,7 @@ def _read_file(value: StartValue) -> Any:
         path = resolve_path(value.file, Path())
     except PathError as error:
         raise StartValueError(str(error), help=error.help) from error
-    if not path.exists():
+    if not os.path.exists(path):
         message = f"there is no file '{path}'"
         raise StartValueError(message, help=explain_missing(path, None))
     if value.key is None:

@@ -6,6 +6,7 @@ what a process is given. Until then a sample of their type stands for them.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -80,7 +81,7 @@ class StartValue:
 
 def _is_file(word: str) -> bool:
     try:
-        return Path(word).is_file()
+        return os.path.isfile(word)
     except (OSError, ValueError):
         return False  # too long, or no path at all
 

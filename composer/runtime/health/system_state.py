@@ -73,7 +73,7 @@ class SystemState:
 
     def __init__(self, name: str, file: str) -> None:
         self.name = name
-        self.file = os.path.abspath(file) if os.path.exists(file) else file  # noqa: PTH100, PTH110 - as written
+        self.file = os.path.abspath(file) if os.path.exists(file) else file  # noqa: PTH100 - as written
         self.is_open = False
         self.is_up = False
         self.is_stopping = False
