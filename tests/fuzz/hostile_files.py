@@ -692,7 +692,7 @@ def enormous_bound(folder):
     declares(folder, f'int32[{2**64}] a\nint32[<={2**70}] b\nstring<={2**64} c\n')
 
 
-@case('bad-syntax')
+@case('bad-type')
 def bound_of_many_digits(folder):
     declares(folder, f'int32[{"9" * 90_000}] a\n')
 

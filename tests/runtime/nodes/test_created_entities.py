@@ -38,7 +38,7 @@ class Rig:
 
     def begin(self, node):
         node.create_timer(0.05, self.ask, group='reentrant')
-        for wrong in (('std_msgs/msg/Strin', 'x'), (String, 'a b'), (String, 'x', -1)):
+        for wrong in (('std_msgs/msg/Strin', 'x'), (String, 'a b'), (String, 'x', -1)):  # composer: ignore[unknown-type]
             refused(node, *wrong)
         refused(node, String, 'x', name='fixed')
         refused(node, String, 'x', colour=3)
