@@ -52,7 +52,6 @@ _KEPT = frozenset(
         'call-arg',
         'call-overload',
         'comparison-overlap',
-        'dict-item',
         'index',
         'list-item',
         'misc',

@@ -1,5 +1,7 @@
 """Entities made in code are as known as those that are declared."""
 
+from sensor_msgs import msg as sensors
+
 
 def begin(node):
     node.create_publisher('std_msgs/msg/String', node.parameters.source, name='echo')
@@ -24,3 +26,6 @@ def wander(node):
     node.publish('/chat', 'x')
     node.publish('status', 'x')
     node.call('light', True)  # error
+
+
+SENSORS = {sensors.Temperature: (20.0, 0.1), sensors.FluidPressure: (101_325, 50)}
