@@ -30,7 +30,7 @@ def watch_hosts(system: str, hosts: Sequence[HostSpec], view: View) -> None:
     source = HostsHealth(system, hosts)
     source.start()
     try:
-        show_screen(system, source, view)
+        show_screen(source, view)
     finally:
         source.stop()
 
@@ -52,12 +52,14 @@ class HostsHealth:
 
     Attributes:
         error: Always `None`: a host that is lost may come back.
+        waits_for: Why there is no answer yet.
     """
 
-    error: ComposerError | None = None
+    error: Exception | None = None
 
     def __init__(self, system: str, hosts: Sequence[HostSpec]) -> None:
         self._system, self._hosts = system, hosts
+        self.waits_for = f'waiting for the answer of {", ".join(each.name for each in hosts)}'
         self._told: dict[str, Mapping[str, Any]] = {}
         self._problems: dict[str, str] = {}
         self._loop = asyncio.new_event_loop()
@@ -70,7 +72,8 @@ class HostsHealth:
         told, problems = dict(self._told), dict(self._problems)
         if not (told or problems):
             return None
-        return {**merge_health(told), 'problems': list(problems.values())}
+        own = {'name': self._system, 'has_cpu': True, 'problems': list(problems.values())}
+        return {**own, **merge_health(told)}
 
     def start(self) -> None:
         """Connect to the hosts."""

@@ -26,6 +26,7 @@ STATUS: Final[Form] = {
     'last_reload': (NoneType, {'time': float, 'succeeded': bool}),
 }
 TOP: Final[Form] = {
+    'name': str,
     'period': int,
     'period_sec': float,
     'has_cpu': bool,

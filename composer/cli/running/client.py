@@ -83,6 +83,7 @@ class Client:
         context = Context()
         # No log file: it logs nothing.
         context.init([], initialize_logging=False)
+        self._context = context
         self._exit.callback(context.try_shutdown)
         self.domain_id: int = context.get_domain_id()
         self.node = Node(
@@ -101,6 +102,10 @@ class Client:
 
     def __exit__(self, *_: object) -> None:
         self._exit.close()
+
+    def interrupt(self) -> None:
+        """Let what another thread waits for raise an error at once."""
+        self._context.try_shutdown()
 
     def ask(self, system: RunningSystem, command: str, timeout_sec: float) -> Outcome:
         """Give a system a command, and return its answer.

@@ -9,7 +9,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-_GAP = '  '
+GAP = '  '
 _MINUTE_SEC, _HOUR_SEC, _DAY_SEC = 60, 3600, 86400
 
 
@@ -20,7 +20,7 @@ def render_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[s
     widths = [max(map(len, column)) for column in columns]
     rights = [bool(body) and all(map(_is_number, column[1:])) for column in columns]
     return [
-        _GAP.join(
+        GAP.join(
             cell.rjust(width) if right else cell.ljust(width)
             for cell, width, right in zip(row, widths, rights, strict=True)
         ).rstrip()

@@ -26,7 +26,6 @@ from composer.terminal import is_output_unread
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from composer.cli.running.client import RunningSystem
     from composer.cli.running.top_table import View
     from composer.runtime.health.system_state import Outcome
 
@@ -50,16 +49,16 @@ def top(
     Raises:
         ComposerError: There is no such system, it measures nothing, or it ended.
     """
+    if not (each_period or once or format_name == 'json') and has_screen():
+        return _watch(name, view)
     with Client() as client:
         system = Discovery(client).find(name)
         with client.asking(system, protocol.TOP) as ask:
             if each_period:
                 return _print_each(ask)
-            if once or format_name == 'json' or not has_screen():
-                document = _wait_for_all(ask)
-                print_health(document, view, format_name)
-                return ExitCode.DONE
-            return _watch(system, ask, view)
+            document = _wait_for_all(ask)
+            print_health(document, view, format_name)
+            return ExitCode.DONE
 
 
 def has_screen() -> bool:
@@ -107,32 +106,39 @@ def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:
     return document
 
 
-def _watch(system: RunningSystem, ask: Callable[[float], Outcome], view: View) -> int:
+def _watch(name: str | None, view: View) -> int:
     from composer.cli.running.top_screen import show_screen
 
-    poller = Poller(ask)
+    poller = Poller(name)
     poller.start()
     try:
-        show_screen(system.name, poller, view)
+        show_screen(poller, view)
     finally:
+        error = poller.error
         poller.stop()
-    if poller.error is not None:
-        raise poller.error
+    if error is not None:
+        raise error
     return ExitCode.DONE
 
 
 class Poller:
-    """A thread that asks again and again, so the screen does not wait for answers.
+    """A thread that finds a system and asks it again and again, so the screen does not wait.
+
+    Args:
+        name: Of the system; `None` for the only one.
 
     Attributes:
+        waits_for: Why there is no answer yet.
         document: The last answer; `None` before the first.
         error: Why there are no more answers.
     """
 
-    def __init__(self, ask: Callable[[float], Outcome]) -> None:
+    def __init__(self, name: str | None) -> None:
+        self._name = name
+        self.waits_for = 'starting ROS'
         self.document: dict[str, Any] | None = None
-        self.error: ComposerError | None = None
-        self._ask = ask
+        self.error: Exception | None = None
+        self._client: Client | None = None
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -143,14 +149,26 @@ class Poller:
     def stop(self) -> None:
         """Ask no more."""
         self._ended.set()
+        if self._client is not None:
+            self._client.interrupt()
         self._thread.join()
 
     def _run(self) -> None:
-        pause_sec = _POLL_SEC
-        while not self._ended.wait(pause_sec):
-            try:
-                self.document = _read(self._ask(STATUS_SEC))
-            except ComposerError as error:
-                self.error = error
-                return
-            pause_sec = max(_POLL_SEC, self.document['period_sec'] / 2)
+        try:
+            with Client() as self._client:
+                self._ask_all(self._client)
+        except Exception as error:  # noqa: BLE001 - it is raised when the screen has gone
+            self.error = error
+
+    def _ask_all(self, client: Client) -> None:
+        what = 'the system' if self._name is None else f"system '{self._name}'"
+        self.waits_for = f'looking for {what} (ROS_DOMAIN_ID {client.domain_id})'
+        if self._ended.is_set():
+            return
+        system = Discovery(client).find(self._name)
+        self.waits_for = f"waiting for the answer of system '{system.name}'"
+        with client.asking(system, protocol.TOP) as ask:
+            pause_sec = 0.0
+            while not self._ended.wait(pause_sec):
+                self.document = _read(ask(STATUS_SEC))
+                pause_sec = max(_POLL_SEC, self.document['period_sec'] / 2)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import curses
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from textwrap import wrap
+from typing import Any, Protocol
 
 from composer import signals
 from composer.cli.common.output import wants_colour
@@ -19,9 +20,6 @@ from composer.cli.running.top_table import (
 )
 from composer.terminal import escape
 
-if TYPE_CHECKING:
-    from composer.errors import ComposerError
-
 _REFRESH_MS = 100
 _HELP = 'q quit   ←→ sort   r reverse   / filter   ↑↓ scroll'
 _ENTER = ('\n', '\r')
@@ -34,11 +32,15 @@ class Source(Protocol):
     """Where the figures come from."""
 
     @property
+    def waits_for(self) -> str:
+        """Why there is no answer yet."""
+
+    @property
     def document(self) -> dict[str, Any] | None:
         """The last answer of the system."""
 
     @property
-    def error(self) -> ComposerError | None:
+    def error(self) -> Exception | None:
         """Why there are no more answers."""
 
 
@@ -51,18 +53,17 @@ def can_draw() -> bool:
     return curses.tigetstr('cup') is not None
 
 
-def show_screen(name: str, source: Source, view: View) -> None:
+def show_screen(source: Source, view: View) -> None:
     """Show the health of a system until the user quits, or there are no more answers."""
     # A lone Escape is not the beginning of a key for long.
     curses.set_escdelay(25)
     with suppress(KeyboardInterrupt), signals.interrupting():
-        curses.wrapper(lambda window: _Screen(window, name, source, view).run())
+        curses.wrapper(lambda window: _Screen(window, source, view).run())
 
 
 class _Screen:
-    def __init__(self, window: curses.window, name: str, source: Source, view: View) -> None:
+    def __init__(self, window: curses.window, source: Source, view: View) -> None:
         self._window = window
-        self._name = escape(name)
         self._source = source
         self._view = view
         self._top = 0
@@ -129,19 +130,24 @@ class _Screen:
         self._view = replace(self._view, text=text)
 
     def _draw(self) -> None:
-        height, _ = self._window.getmaxyx()
+        height, width = self._window.getmaxyx()
         self._window.erase()
+        self._write(height - 1, _HELP, curses.A_DIM)
         document = self._source.document
         if document is None:
-            self._write(0, f'{self._name}: waiting for its answer')
+            self._write(0, escape(self._source.waits_for))
             self._window.refresh()
             return
         entities = select_entities(document['entities'], self._view)
-        worst = [*map(describe_worst, find_worst(document)), *document.get('problems', ())]
+        worst = [
+            line
+            for text in (*map(describe_worst, find_worst(document)), *document.get('problems', ()))
+            for line in wrap(text, width)
+        ]
         room = max(0, height - 3 - len(worst))
         self._top = max(0, min(self._top, len(entities) - room))
-        header, *rows = render_entities(entities)
-        self._write(0, self._describe(len(entities), len(document['entities'])))
+        header, *rows = render_entities(entities, self._view.sort, width)
+        self._write(0, self._describe(document, len(entities)))
         self._write(1, header, curses.A_REVERSE)
         for line, (row, entity) in enumerate(
             zip(rows[self._top :][:room], entities[self._top :], strict=False), 2
@@ -149,14 +155,16 @@ class _Screen:
             self._write(line, row, self._styles.get(entity['level'], 0))
         for line, text in enumerate(worst, height - 1 - len(worst)):
             self._write(line, text, self._styles.get('warn', 0))
-        self._write(height - 1, _HELP, curses.A_DIM)
         self._window.refresh()
 
-    def _describe(self, shown: int, count: int) -> str:
+    def _describe(self, document: dict[str, Any], shown: int) -> str:
         order = ', reversed' if self._view.is_reversed else ''
-        text = f'{self._name}: {shown} of {count} entities, by {self._view.sort}{order}'
+        count = f'{shown} of {len(document["entities"])} entities'
+        text = f'{escape(document["name"])}: {count}, by {self._view.sort}{order}'
         if self._is_typing or self._view.text:
             text += f', filter: {self._view.text}{"_" if self._is_typing else ""}'
+        if not document['has_cpu']:
+            text += f' (CPU is measured in the next {document["period_sec"]:g} s)'
         return text
 
     def _write(self, line: int, text: str, style: int = 0) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.running.tables import render_table
+from composer.cli.running.tables import GAP, render_table
 from composer.records import record
 from composer.terminal import escape
 
@@ -20,11 +20,15 @@ class Column:
         title: Its name, by which it is sorted, too.
         value: Returns what it is sorted by; `None` for what is not known.
         show: Returns what is shown of a value.
+        rank: Where the terminal is too narrow, columns of a higher rank are left out first.
+        least: The narrowest that it may be; `None` if its cells are never shortened.
     """
 
     title: str
     value: Callable[[Mapping[str, Any]], Any]
     show: Callable[[Any], str]
+    rank: int
+    least: int | None = None
 
 
 def _field(key: str) -> Callable[[Mapping[str, Any]], Any]:
@@ -50,27 +54,29 @@ def _delivery(entity: Mapping[str, Any]) -> str | None:
 
 
 COLUMNS = (
-    Column('ENTITY', _describe, str),
-    Column('RATE/S', _field('rate_hz'), lambda value: f'{value:.1f}'),
-    Column('MEAN MS', _field('mean_ms'), _times),
-    Column('P99 MS', _field('p99_ms'), _times),
-    Column('MAX MS', _field('max_ms'), _times),
-    Column('CPU', _field('cpu'), lambda value: f'{value:.1%}'),
-    Column('GIL', _field('gil'), lambda value: f'{value:.1%}'),
-    Column('QUEUE', _field('queued'), str),
-    Column('DROPPED', _field('dropped'), str),
-    Column('LATE', _missed, str),
-    Column('ERRORS', _field('errors'), str),
-    Column('DELIVERY', _delivery, str),
+    Column('ENTITY', _describe, str, 0, 28),
+    Column('RATE/S', _field('rate_hz'), lambda value: f'{value:.1f}', 3),
+    Column('MEAN MS', _field('mean_ms'), _times, 11),
+    Column('P99 MS', _field('p99_ms'), _times, 12),
+    Column('MAX MS', _field('max_ms'), _times, 13),
+    Column('CPU', _field('cpu'), lambda value: f'{value:.1%}', 2),
+    Column('GIL', _field('gil'), lambda value: f'{value:.1%}', 14),
+    Column('QUEUE', _field('queued'), str, 6),
+    Column('DROPPED', _field('dropped'), str, 5),
+    Column('LATE', _missed, str, 10),
+    Column('ERRORS', _field('errors'), str, 4),
+    Column('DELIVERY', _delivery, str, 7, 8),
 )
 # Only of systems with workers; an empty one is the process of the system.
-_WORKER = Column('WORKER', lambda entity: escape(entity['worker']) or None, str)
+_WORKER = Column('WORKER', lambda entity: escape(entity['worker']) or None, str, 8, 6)
 # Only of several hosts.
-_HOST = Column('HOST', lambda entity: escape(entity.get('host', '')) or None, str)
+_HOST = Column('HOST', lambda entity: escape(entity.get('host', '')) or None, str, 1, 6)
 SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
 }
 DEFAULT_SORT = 'cpu'
+# Names are at least so long before columns of a higher rank than this have a place.
+_READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 14
 # A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
 _WAITED_MS = 0.5
 _KEPT_SHARE = 0.1
@@ -148,14 +154,65 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
     )
 
 
-def render_entities(entities: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the lines of the table, its header first."""
+def render_entities(
+    entities: Sequence[Mapping[str, Any]], sort: str = DEFAULT_SORT, width: int | None = None
+) -> list[str]:
+    """Return the lines of the table, its header first.
+
+    Args:
+        sort: The column that is shown in any case: a key of `SORT_NAMES`.
+        width: The longest that a line may be, for which names are shortened and columns left out.
+    """
     has_workers = any(each['worker'] for each in entities)
     has_hosts = any(each.get('host') for each in entities)
     entity, *figures = COLUMNS
     columns = (entity, *(_HOST,) * has_hosts, *figures, *(_WORKER,) * has_workers)
-    rows = [
-        ['-' if (value := each.value(entity)) is None else each.show(value) for each in columns]
-        for entity in entities
-    ]
-    return render_table([each.title for each in columns], rows)
+    cells = {
+        each: [
+            each.title,
+            *(
+                '-' if (value := each.value(entity)) is None else each.show(value)
+                for entity in entities
+            ),
+        ]
+        for each in columns
+    }
+    if width is not None:
+        cells = _fit(cells, SORT_NAMES[sort], width)
+    header, *rows = zip(*cells.values(), strict=True)
+    return render_table(header, rows)
+
+
+def _fit(cells: Mapping[Column, list[str]], sort: Column, width: int) -> dict[Column, list[str]]:
+    """Return the columns that fit into lines of `width`, with their cells shortened."""
+    room = width + len(GAP)
+    wanted = {each: max(map(len, texts)) for each, texts in cells.items()}
+    steps = [(each.rank * (each is not sort), each, each.least or wanted[each]) for each in cells]
+    steps += [(_READABLE_RANK, COLUMNS[0], _READABLE)]
+    steps += [(each.rank + _LAST_RANK, each, wanted[each]) for each in cells if each.least]
+    widths: dict[Column, int] = {}
+    for _, each, target in sorted(steps, key=lambda step: step[0]):
+        now = widths.get(each, -len(GAP))
+        more = min(target, wanted[each]) - now
+        more = min(more, room) if each in widths else more
+        if more <= room:
+            widths[each] = now + more
+            room -= more
+    return {
+        each: [_shorten(text, widths[each]) for text in texts]
+        for each, texts in cells.items()
+        if each in widths
+    }
+
+
+def _shorten(text: str, width: int) -> str:
+    """Return a text of at most `width` characters; names keep their beginning and their end."""
+    if len(text) <= width:
+        return text
+    node, colon, task = text.partition(': ')
+    if not colon:
+        end = (width - 1) // 2
+        return f'{text[: width - 1 - end]}…{text[len(text) - end :]}'
+    room = width - len(colon)
+    task = _shorten(task, max(room // 2, room - len(node)))
+    return f'{_shorten(node, room - len(task))}{colon}{task}'

@@ -77,6 +77,7 @@ class Requests:
         waiting: The futures of requests whose answers are waited for.
         losses: How often a process was killed that may have had the server.
         ended: The error of requests if the client is gone.
+        sent: How many requests were sent.
     """
 
     waits: Waits
@@ -89,6 +90,7 @@ class Requests:
     waiting: set[Future] = field(default_factory=set)
     losses: int = 0
     ended: list[ComposerError] = field(default_factory=list)
+    sent: int = 0
 
     def end(self, error: ComposerError) -> None:
         """End all requests with an error, as their client goes."""
@@ -173,6 +175,7 @@ class Requests:
             self._raise_end()
             raise
         self._raise_end()
+        self.sent += 1
         self.waiting.add(future)
         if self.losses != losses:
             # Perhaps while it was sent.

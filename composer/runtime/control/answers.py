@@ -83,7 +83,7 @@ def describe_top(
     """Return the health of each entity in the last period, and have more measured in the next.
 
     Args:
-        deliveries: Which way publishers and clients deliver, which have no figures else.
+        deliveries: Which way publishers and clients deliver, which have no figures but a rate.
     """
     diagnostics.watch()
     latest = diagnostics.latest
@@ -94,7 +94,7 @@ def describe_top(
         'has_cpu': latest.costs is not None and not latest.costs.awaits_samples,
         'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
         'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
-        + [_describe_delivery(key, each) for key, each in deliveries.items()]
+        + [_describe_delivery(key, each, latest.rates) for key, each in deliveries.items()]
         + [
             _describe_figureless((node, Owner('lifecycle', each)), None, '')
             for node, each in state.find_lifecycles().items()
@@ -172,8 +172,11 @@ def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
     }
 
 
-def _describe_delivery(key: EntityKey, delivery: Delivery) -> dict[str, Any]:
-    return _describe_figureless(key, delivery.way, delivery.reason)
+def _describe_delivery(
+    key: EntityKey, delivery: Delivery, rates: Mapping[EntityKey, float]
+) -> dict[str, Any]:
+    described = _describe_figureless(key, delivery.way, delivery.reason)
+    return {**described, 'rate_hz': rates.get(key)}
 
 
 def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[str, Any]:

@@ -96,9 +96,9 @@ class ActionClient:
             self.lose_server()
         return goal
 
-    def delivery(self) -> tuple[str, str]:
-        """Return which way goals go now, and why; see `LocalClient.delivery`."""
-        return self._local.delivery()
+    def delivery(self) -> tuple[str, str, int]:
+        """Return which way goals go now, why, and how many; see `LocalClient.delivery`."""
+        return *self._local.delivery(), self._requests.sent
 
     def change(self, spec: ActionClientSpec) -> None:
         """See `LiveEntity`."""

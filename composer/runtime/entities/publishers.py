@@ -82,9 +82,9 @@ class Publisher:
             text = f"publisher '{self._spec.name}' drops what is published"
             node.ros.get_logger().warning(f'{text}: the node is {lifecycle.state}')
 
-    def delivery(self) -> tuple[str, str]:
-        """Return which way messages go now, and why; see `LocalPublisher.delivery`."""
-        return self._local.delivery()
+    def delivery(self) -> tuple[str, str, int]:
+        """Return which way messages go now, why, and how many; see `LocalPublisher.delivery`."""
+        return *self._local.delivery(), self._local.published
 
     def change(self, spec: PublisherSpec) -> None:
         """See `LiveEntity`."""

@@ -105,9 +105,9 @@ class ServiceClient:
     def _is_available(self) -> bool:
         return self._local.server is not None or self._client.service_is_ready()
 
-    def delivery(self) -> tuple[str, str]:
-        """Return which way requests go now, and why; see `LocalClient.delivery`."""
-        return self._local.delivery()
+    def delivery(self) -> tuple[str, str, int]:
+        """Return which way requests go now, why, and how many; see `LocalClient.delivery`."""
+        return *self._local.delivery(), self._requests.sent
 
     def change(self, spec: ServiceClientSpec) -> None:
         """See `LiveEntity`."""

@@ -29,10 +29,12 @@ class Delivery:
     Attributes:
         way: `local`, or `sent`; empty if nobody listens.
         reason: Why it is sent.
+        count: How many messages, requests or goals it has sent or handed over.
     """
 
     way: str
     reason: str
+    count: int
 
     def __str__(self) -> str:
         """Return `sent, 1 subscription outside`."""

@@ -94,14 +94,17 @@ def summarize_report(report: EntityReport) -> tuple[bytes, str]:
     return DiagnosticStatus.OK, 'called' if report.times.counts else 'not called'
 
 
-def delivery_status(node: str, owner: Owner, delivery: Delivery, system: str) -> DiagnosticStatus:
-    """Return the status of a publisher or a client, which has no behaviour: its way.
+def delivery_status(
+    node: str, owner: Owner, delivery: Delivery, system: str, rate_hz: float | None
+) -> DiagnosticStatus:
+    """Return the status of a publisher or a client, which has no behaviour: its way and rate.
 
     Args:
         node: The full name of its node.
         system: The system's name.
     """
     values = {'delivery': delivery.way, 'delivery reason': delivery.reason}
+    values |= {} if rate_hz is None else {'rate (Hz)': f'{rate_hz:.2f}'}
     return DiagnosticStatus(
         name=_name(node, owner),
         hardware_id=system,

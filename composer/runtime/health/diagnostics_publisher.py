@@ -38,11 +38,13 @@ class Reports:
     Attributes:
         number: Counts the periods.
         costs: Those of the process; `None` if it was not measured what calls cost.
+        rates: How often publishers and clients sent in a second, if that was measured.
     """
 
     number: int
     costs: ProcessCosts | None
     by_entity: Mapping[EntityKey, EntityReport]
+    rates: Mapping[EntityKey, float]
 
 
 class CallWatcher(Protocol):
@@ -79,13 +81,14 @@ class DiagnosticsPublisher:
     ) -> None:
         self._worker = worker
         self._find_deliveries = find_deliveries
-        self.latest = Reports(0, None, {})
+        self.latest = Reports(0, None, {}, {})
         self.period_sec = period_sec
         self._state = state
         self._registry = registry
         self._calls = calls
         self._meter = ProcessMeter()
         self._watched_until = 0.0
+        self._sent: dict[EntityKey, int] = {}
         self._has_ended = False
         self._woken = threading.Event()
         self._thread = threading.Thread(target=self._run, name='diagnostics', daemon=True)
@@ -140,11 +143,13 @@ class DiagnosticsPublisher:
                 due = monotonic() + self.period_sec
                 continue
             now = monotonic()
-            latest = self.latest = self._take_reports(now - begun)
+            is_heard = bool(self._publisher.get_subscription_count())
+            is_watched = is_heard or now < self._watched_until
+            deliveries = self._find_deliveries() if is_watched else {}
+            latest = self.latest = self._take_reports(now - begun, deliveries)
             begun = now
             due = max(due, now) + self.period_sec
-            is_heard = bool(self._publisher.get_subscription_count())
-            self._measure_calls(on=is_heard or now < self._watched_until)
+            self._measure_calls(on=is_watched)
             if not is_heard:
                 continue
             name = self._node.get_fully_qualified_name()
@@ -154,8 +159,8 @@ class DiagnosticsPublisher:
                     writers[key] = StatusWriter(*key, self._state.name, self._worker)
                 statuses.append(writers[key].write(report))
             statuses += [
-                delivery_status(*key, each, self._state.name)
-                for key, each in self._find_deliveries().items()
+                delivery_status(*key, each, self._state.name, latest.rates.get(key))
+                for key, each in deliveries.items()
             ]
             statuses += [
                 lifecycle_status(node, each, self._state.name)
@@ -167,7 +172,7 @@ class DiagnosticsPublisher:
                 message.header.stamp = stamp
                 self._publisher.publish(message)
 
-    def _take_reports(self, period_sec: float) -> Reports:
+    def _take_reports(self, period_sec: float, deliveries: Deliveries) -> Reports:
         """Return the health in the period that ends."""
         costs = None
         if call_meter.is_on:
@@ -177,7 +182,14 @@ class DiagnosticsPublisher:
         reports = self._registry.reports(
             period_sec, self._calls.overdue_calls(), monotonic_ns(), sampled_ns
         )
-        return Reports(self.latest.number + 1, costs, reports)
+        before, self._sent = self._sent, {key: each.count for key, each in deliveries.items()}
+        rates = {
+            # One that was created again counts from 0.
+            key: (count - before[key] if count >= before[key] else count) / period_sec
+            for key, count in self._sent.items()
+            if key in before
+        }
+        return Reports(self.latest.number + 1, costs, reports, rates)
 
     def _measure_calls(self, *, on: bool) -> None:
         if on and not call_meter.is_on:

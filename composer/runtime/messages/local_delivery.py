@@ -55,6 +55,7 @@ class LocalPublisher:
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
         tap: Called with each message before it goes anywhere; it must not change or keep it.
+        published: How many messages it was given.
     """
 
     def __init__(self, node: Any, ros: RosPublisher, *, is_local: bool, returns: bool) -> None:
@@ -63,6 +64,7 @@ class LocalPublisher:
         self.is_local = is_local
         self.reason = ''
         self.tap: Callable[[Any], None] | None = None
+        self.published = 0
         self._own_reason = why_sent(ros.qos_profile)
         self._returns = returns
         self._ownership = ownership_of(ros.msg_type)
@@ -121,6 +123,7 @@ class LocalPublisher:
         Args:
             is_held: Whether somebody refers to it.
         """
+        self.published += 1
         if self.tap is not None:
             self.tap(message)
         if self.reason:

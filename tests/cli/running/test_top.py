@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ pytest.importorskip('rclpy')
 from composer.cli.hosts.top_hosts import merge_health
 from composer.cli.main import run
 from composer.cli.running.top_table import (
+    SORT_NAMES,
     View,
     describe_worst,
     find_worst,
@@ -130,6 +132,44 @@ def test_workers_are_a_column_where_there_are_any():
     assert [line.split()[-1] for line in render_entities(placed)] == ['WORKER', 'vision', '-']
 
 
+LONG_NAMES = [
+    entity(
+        f'/fleet/robot_01/obstacle_detection_filter_{each}',
+        'compressed_image',
+        kind='subscription',
+        cpu=0.1,
+        rate_hz=1000.0,
+        delivery='sent',
+        delivery_reason='1 subscription outside',
+        host='base',
+        worker='vision',
+    )
+    for each in range(12)
+]
+
+
+@pytest.mark.parametrize('sort', SORT_NAMES)
+@pytest.mark.parametrize('more', [('host', 'worker'), ('worker',), ()], ids=' '.join)
+@pytest.mark.parametrize('width', [40, 60, 80, 120, 200, 300])
+def test_lines_fit_and_show_the_column_that_they_are_sorted_by(width, more, sort):
+    entities = [
+        {key: each[key] for key in each if key != 'host' or key in more}
+        | {'worker': each['worker'] if 'worker' in more else ''}
+        for each in LONG_NAMES
+    ]
+    header, *lines = render_entities(entities, sort, width)
+    assert max(map(len, [header, *lines])) <= width
+    assert SORT_NAMES[sort].title in header
+    # Names that differ still do.
+    assert len(set(lines)) == len(entities)
+    if width >= 80 and sort == 'cpu':
+        assert {'ENTITY', 'RATE/S', 'CPU', 'DROPPED', 'ERRORS'} < set(header.split())
+    if width >= 80 and sort == 'cpu' and not more:
+        assert {'QUEUE', 'DELIVERY'} < set(header.split())
+    if width == 300:
+        assert [header, *lines] == render_entities(entities)
+
+
 def process(worker='', **figures):
     waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, 'gil': 0.9, **waits, **figures}
@@ -241,14 +281,32 @@ def test_a_system_that_measures_nothing_is_told_of(compose, capsys):
     )
 
 
+def top_command(compose):
+    path = f'PYTHONPATH={ROOT}:{os.environ.get("PYTHONPATH", "")}'
+    domain = f'ROS_DOMAIN_ID={compose.domain_id}'
+    return shlex.join(['env', path, domain, sys.executable, '-m', 'composer', 'top', 'system'])
+
+
+@pytest.mark.ros
+def test_the_screen_says_what_it_waits_for_and_ends_meanwhile(compose, terminal):
+    child = compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    os.kill(child.pid, signal.SIGSTOP)
+    try:
+        terminal.run(top_command(compose))
+        lines = terminal.shows("looking for system 'system' (ROS_DOMAIN_ID")
+        assert lines[-1].startswith('q quit')
+        terminal.type('q')
+        terminal.shows('exit code 0')
+    finally:
+        os.kill(child.pid, signal.SIGCONT)
+
+
 @pytest.mark.ros
 def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
     child = compose(SYSTEM + 'diagnostics: {period: 0.2}\n', CODE)
     child.wait_until_ready()
-    path = f'PYTHONPATH={ROOT}:{os.environ.get("PYTHONPATH", "")}'
-    domain = f'ROS_DOMAIN_ID={compose.domain_id}'
-    command = shlex.join(['env', path, domain, sys.executable, '-m', 'composer', 'top'])
-    terminal.run(command)
+    terminal.run(top_command(compose))
     # On a crowded machine, the first figures may mislead.
     terminal.wait_until(
         lambda lines: (
@@ -270,7 +328,7 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
     terminal.resize(50, 5)
     terminal.wait_until(
         lambda lines: (
-            len(lines) == 5 and 'ERRORS' not in lines[1] and lines[4].startswith('q quit')
+            len(lines) == 5 and 'QUEUE' not in lines[1] and lines[4].startswith('q quit')
         ),
         'a small one',
     )

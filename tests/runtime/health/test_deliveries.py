@@ -87,3 +87,32 @@ def test_the_way_is_told_and_changes_in_place(compose, peer, wait_for, capsys):
     assert run(['reload']) == 0
     assert '~1 publisher' in capsys.readouterr()[0]
     assert deliveries()['near'] == ('sent', 'local_delivery: false')
+
+
+def test_publishers_and_clients_have_a_rate(compose, capsys, wait_for):
+    system = SYSTEM.replace(
+        'say: {rate: 50, publish: near, message: 1}',
+        'say: {rate: 50, behaviour: parts:say}\n      slow: {rate: 10, behaviour: parts:call}',
+    )
+    code = f"""{CODE}
+def say(node):
+    node.publish('near', 1)
+    node.publish('kept', 1)
+
+async def call(node):
+    await node.call_async('ask')
+    node.send_goal('go', {{'order': 1}})
+"""
+    compose(system, code).wait_until_ready()
+
+    def have_rates():
+        assert run(['top', '--once', '--format', 'json']) == 0
+        rates = {
+            each['name']: each['rate_hz']
+            for each in json.loads(capsys.readouterr()[0])['entities']
+            if each['delivery'] is not None
+        }
+        none = {each for each, rate in rates.items() if rate == 0.0}
+        return none == {'nowhere', 'far'} and min(rates['near'], rates['kept']) > rates['ask']
+
+    wait_for(have_rates, 'the rates')
