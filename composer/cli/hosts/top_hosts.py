@@ -72,8 +72,8 @@ class HostsHealth:
         told, problems = dict(self._told), dict(self._problems)
         if not (told or problems):
             return None
-        own = {'name': self._system, 'has_cpu': True, 'problems': list(problems.values())}
-        return {**own, **merge_health(told)}
+        own = {'has_cpu': True, 'problems': list(problems.values())}
+        return {**own, **merge_health(told), 'name': self._system}
 
     def start(self) -> None:
         """Connect to the hosts."""
