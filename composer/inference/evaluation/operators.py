@@ -85,6 +85,7 @@ _POWERS = (ast.Pow, ast.LShift)
 # Larger numbers and longer texts are not computed.
 _GREATEST = 2**64
 _LONGEST = 200
+_LONGEST_REPEATED = 100_000
 _GREATEST_POWER = 64
 # What an operator may meet in pairs.
 _MOST_PAIRS = 16
@@ -197,7 +198,7 @@ def _is_repeated(sign: ast.operator, left: Constant, right: Constant) -> bool:
     if not isinstance(sign, ast.Mult) or str not in (left.kind, right.kind):
         return False
     sizes = [len(each.value) if each.kind is str else each.value for each in (left, right)]
-    return int in (left.kind, right.kind) and sizes[0] * sizes[1] > _LONGEST
+    return int in (left.kind, right.kind) and sizes[0] * sizes[1] > _LONGEST_REPEATED
 
 
 def _kind(value: Value) -> type | None:
