@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import Span
 from composer.inference.reading import NodeUse, Problem, Reading, StateUse
 from composer.inference.values import (
+    ANY,
     BY_RUN,
     BY_STATE,
     Constant,
     Place,
+    Scalar,
     alternatives,
     is_chosen,
 )
@@ -241,6 +243,12 @@ class Run:
                 **details,
             )
         )
+
+    def use_any(self, kind: str, name: Value, place: Place) -> None:
+        """Note the use of an entity by a name of which at most a part is known."""
+        self.reading.open_kinds.add(kind)
+        if isinstance(name, Scalar) and name.pattern.strip(ANY):
+            self.use(kind, name.pattern, place)
 
     def use_own_state(self, name: str, place: Place) -> None:
         """Note that a key of `node.own_state` is read."""

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Question = tuple[str, str]
 _PYTHON_TYPES: dict[str, type] = {'bool': bool, 'integer': int, 'double': float, 'string': str}
+# An array of numbers that a service sets is an `array.array`, which is much like a list.
+_PYTHON_TYPES |= {f'{name}_array': list for name in _PYTHON_TYPES}
 
 
 @dataclass(slots=True)

@@ -74,12 +74,14 @@ class Scalar:
 
     Attributes:
         unset: The parameter that it is, if this is `None` until something sets it.
+        pattern: Of a text, the parts that are known, with `ANY` for the others.
     """
 
     kind: type
     is_chosen: int = 0
     origin: Place | None = field(default=None, compare=False)
     unset: str = ''
+    pattern: str = ''
 
 
 @record
@@ -494,6 +496,8 @@ Value: TypeAlias = (
     | Alternatives
 )
 
+# Stands in patterns for any characters.
+ANY = '\0'
 BY_RUN = 1
 BY_STATE = 2
 BY_FILE = 3
@@ -510,6 +514,13 @@ NONE = Constant(type(None), None)
 def constant(value: object, origin: Place | None = None, *, is_chosen: int = 0) -> Constant:
     """Return the value of a constant."""
     return Constant(type(value), value, is_chosen, origin)
+
+
+def pattern_of(value: Value) -> str:
+    """Return what is known of a text, with `ANY` for the rest."""
+    if isinstance(value, Constant) and isinstance(value.value, str | int):
+        return str(value.value)
+    return getattr(value, 'pattern', '') or ANY
 
 
 def alternatives(value: Value) -> tuple[Value, ...]:

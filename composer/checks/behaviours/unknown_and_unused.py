@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -14,11 +15,12 @@ from composer.entity_kinds import (
     NODE_BEHAVIOURS,
     USED_KINDS,
 )
+from composer.inference.values import ANY
 from composer.language.specs import NodeSpec
 from composer.spelling import find_nearest, is_short, is_typo, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
@@ -91,7 +93,8 @@ def _check_names(
             for use in reading.uses:
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
                     continue
-                if (use.kind, use.name) in created or (use.kind, None) in created:
+                made = [each for kind, each in created if kind == use.kind]
+                if None in made or _is_one_of(use.name, [each for each in made if each]):
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
@@ -138,9 +141,18 @@ def _is_typo(
 def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> bool:
     """Return whether a node declares something, or may declare it under a misspelt key."""
     section = KIND_OF_NOUN[kind].section
-    if name in getattr(node, section) or (kind == 'parameter' and name in _OF_EVERY_NODE):
+    of_all = _OF_EVERY_NODE if kind == 'parameter' else set()
+    if _is_one_of(name, {*getattr(node, section), *of_all}):
         return True
     return any(path in ((section,), (section, name)) or _is_unknown(path) for path in lost)
+
+
+def _is_one_of(name: str, known: Collection[str]) -> bool:
+    """Return whether a name is known, or may be; of one that is computed, parts are given."""
+    if ANY not in name:
+        return name in known
+    pattern = re.compile('.*'.join(map(re.escape, name.split(ANY))), re.DOTALL)
+    return any(map(pattern.fullmatch, known))
 
 
 def _is_unknown(path: DataPath) -> bool:
@@ -152,7 +164,8 @@ def _explain_name(
     context: CheckContext, node: NodeSpec, binding: Binding, use: NodeUse
 ) -> Diagnostic:
     kind = KIND_OF_NOUN[use.kind]
-    declares_not = f"node '{node.name}' declares no {use.kind} '{use.name}'"
+    name = use.name.replace(ANY, '…')
+    declares_not = f"node '{node.name}' declares no {use.kind} '{name}'"
     rule = f'unknown-{kind.slug}'
     message = declares_not
     if use.is_optional:
@@ -163,7 +176,7 @@ def _explain_name(
         rule,
         message,
         help=suggest(
-            use.name,
+            name,
             getattr(node, kind.section),
             'it declares',
             f"declare it under '{kind.section}:'",

@@ -338,7 +338,7 @@ class Attributes(Part):
                 )
                 found.append(run.facts.value_of_parameter(each.value))
             else:
-                run.reading.open_kinds.add('parameter')
+                run.use_any('parameter', each, place)
                 found.append(UNKNOWN)
         return join(found)
 

@@ -202,9 +202,11 @@ class Evaluator:
             return value.result
         return value
 
-    def refuse(self, place: Place, function: Callable[..., object], *arguments: Value) -> None:
+    def refuse(
+        self, place: Place, function: Callable[..., object], *arguments: Value, **named: Value
+    ) -> None:
         """Report that Python refuses the types of what a function is called with."""
-        problem = refusal(function, *arguments)
+        problem = refusal(function, *arguments, **named)
         if problem is not None:
             self.run.report('bad-call', place, problem)
 

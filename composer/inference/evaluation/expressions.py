@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import operator
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from composer.inference.evaluation.library.known_values import (
@@ -26,6 +27,7 @@ from composer.inference.evaluation.part import Part
 from composer.inference.message_types import item_of
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
+    ANY,
     NONE,
     UNKNOWN,
     Alternatives,
@@ -47,6 +49,7 @@ from composer.inference.values import (
     is_chosen,
     join,
     once_set,
+    pattern_of,
     truth_of,
 )
 from composer.python_source.local_names import list_arguments
@@ -92,7 +95,7 @@ class Expressions(Part):
             return UNKNOWN
         value = cast('Value', method(node, scope))
         if isinstance(value, Scalar) and value.origin is None and isinstance(node, _MAKING):
-            return Scalar(value.kind, value.is_chosen, Place(scope.module, node))
+            return replace(value, origin=Place(scope.module, node))
         return value
 
     def _evaluate_all(self, nodes: Iterable[ast.AST], scope: Scope) -> None:
@@ -127,10 +130,11 @@ class Expressions(Part):
             several = [each for each in alternatives(value) if isinstance(each, Constant)]
             simple = all(isinstance(each.value, str | int) for each in several)
             is_known = simple and len(several) == len(alternatives(value))
-            texts = [f'{text}{each.value}' for text in texts for each in several if is_known]
-        if not 0 < len(texts) <= _MOST_TEXTS:
-            return Scalar(str, chosen)
+            parts = [each.value for each in several] if is_known else [pattern_of(value)]
+            texts = [f'{text}{each}' for text in texts for each in parts]
         place = Place(scope.module, node)
+        if len(texts) > _MOST_TEXTS or any(ANY in each for each in texts):
+            return Scalar(str, chosen, place, pattern=texts[0] if len(texts) == 1 else '')
         return join(constant(text, place, is_chosen=chosen) for text in texts)
 
     def _list(self, node: ast.List | ast.Tuple | ast.Set, scope: Scope) -> Value:

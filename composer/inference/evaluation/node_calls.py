@@ -84,7 +84,7 @@ class NodeCalls(Part):
             waited = ''
         for each in several:
             if not isinstance(each, Constant) or not isinstance(each.value, str):
-                self._evaluator.run.reading.open_kinds.add(kind)
+                self._evaluator.run.use_any(kind, each, name.place)
                 results.append(UNKNOWN)
                 continue
             # Of several names, conditions may leave out some, unless they are chosen right here.
@@ -148,7 +148,12 @@ class NodeCalls(Part):
                 given.append(Message(f'{type_name}{part}') if type_name else UNKNOWN)
             called = Arguments(tuple(Argument(each, behaviour.place) for each in given))
             with run.condition():
-                self._evaluator.calls.invoke(behaviour.value, called, behaviour.place, waits=False)
+                answer = self._evaluator.calls.invoke(
+                    behaviour.value, called, behaviour.place, waits=False
+                )
+            if kind.channel == 'service' and type_name:
+                answer = join(getattr(each, 'result', each) for each in alternatives(answer))
+                self._evaluator.payloads.check(f'{type_name}_Response', answer, behaviour.place)
         for argument in arguments.all():
             if argument is not behaviour:
                 self._evaluator.escape(argument.value)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 from array import array
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.values import (
     AGAIN,
+    ANY,
     BY_FILE,
     UNKNOWN,
     ArrayField,
@@ -31,6 +35,7 @@ from composer.inference.values import (
     is_chosen,
     is_none,
     join,
+    pattern_of,
     truth_of,
 )
 
@@ -51,8 +56,11 @@ ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.LShift: operator.lshift,
     ast.RShift: operator.rshift,
 }
+_EPOCH = datetime.fromtimestamp(0, UTC)
+_SAMPLES: list[Any] = [True, 1, 1.0, '1', b'1', [], Path(), _EPOCH, _EPOCH.date(), timedelta(1)]
 # A value of each type that operators are tried with.
-SAMPLES: dict[type | None, Any] = {bool: True, int: 1, float: 1.0, str: '1', bytes: b'1'}
+SAMPLES: dict[type | None, Any] = {type(each): each for each in _SAMPLES}
+_CONVERSION = re.compile(r'%[-+ #0-9.]*[a-zA-Z]')
 _EQUALITIES = (operator.eq, operator.ne)
 _NUMBERS = (bool, int, float)
 _SETS: tuple[type, ...] = (set, frozenset, type({}.keys()))
@@ -151,8 +159,15 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
     kinds = (_kind(left), _kind(right))
     result = _result(sign, *kinds)
     if result is not None:
-        return Scalar(result, chosen)
+        return Scalar(result, chosen, pattern=_pattern(sign, left, right))
     return Unknown(chosen)
+
+
+def _pattern(sign: ast.operator, left: Value, right: Value) -> str:
+    if isinstance(sign, ast.Mod) and isinstance(left, Constant) and left.kind is str:
+        return _CONVERSION.sub(ANY, left.value)
+    is_sum = isinstance(sign, ast.Add) and _kind(left) is str
+    return pattern_of(left) + pattern_of(right) if is_sum else ''
 
 
 def _combine_sequence(sign: ast.operator, left: Sequence, right: Value) -> Value:

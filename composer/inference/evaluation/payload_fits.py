@@ -107,7 +107,7 @@ class Payloads(Part):
         self, type_name: str, field: FieldDescription, value: Value, place: Place
     ) -> None:
         """Check what a field of a message is to hold."""
-        fit = _Fit(type_name, self._evaluator.run.types)
+        fit = _Fit(type_name, self._evaluator.run.types, is_stored=True)
         path = (field.name,)
         found = fit.any_of(value, lambda each: fit.field(field.type, each, place, path))
         self._settle(found, fit, place)
@@ -163,10 +163,13 @@ class _Fit:
 
     Attributes:
         alternatives: Dictionaries and lists that are one of several, and what is wrong in each.
+        is_stored: Whether rclpy stores them as they are: it sends a whole number in a field for
+            a float as another number.
     """
 
-    def __init__(self, root: str, types: MessageTypes) -> None:
+    def __init__(self, root: str, types: MessageTypes, *, is_stored: bool = False) -> None:
         self.root = root
+        self.is_stored = is_stored
         self.types = types
         self.alternatives: list[tuple[Value, list[Misfit]]] = []
 
@@ -293,7 +296,11 @@ class _Fit:
                     yield from self.any_of(item, reader)
             case Constant():
                 yield from self._tried(lambda: read_items(field_type, value.value), place, path)
-            case Scalar() if value.kind is not bytes or field_type.kind not in OCTET_KINDS:
+            case Scalar(kind=kind) if kind is list or (
+                kind is bytes and field_type.kind in OCTET_KINDS
+            ):
+                return
+            case Scalar():
                 yield self._wrong(field_type, value, place, path)
             case ArrayField():
                 is_text = field_type.kind in _TEXTS, value.type.kind in _TEXTS
@@ -312,6 +319,9 @@ class _Fit:
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
         match value:
+            case Constant() | Scalar() if self.is_stored and _is_whole(field_type, value):
+                text = f'expected {field_type}, got {_shown(value)}'
+                yield self._misfit('field-type', text, place, path, 'write it as a float: 1.0')
             case Constant():
                 yield from self._tried(lambda: scalar_reader(field_type)(value.value), place, path)
             case Scalar() if value.unset and _may_hold(field_type.kind, value.kind):
@@ -359,6 +369,10 @@ def _may_hold(kind: str, given: type) -> bool:
     if kind == 'bool':
         return given is bool
     return given is int or (kind == 'byte' and given is bytes and kind in INTEGER_RANGES)
+
+
+def _is_whole(field_type: FieldType, value: Constant | Scalar) -> bool:
+    return field_type.kind in _FLOATS and value.kind is int and not getattr(value, 'member', None)
 
 
 def _is_no_value(value: Value) -> bool:

@@ -71,6 +71,7 @@ class Statements(Part):
             case ast.Starred():
                 self.store(target.value, UNKNOWN, scope)
             case ast.Tuple() | ast.List():
+                self._evaluator.refuse(Place(scope.module, target), iter, value)
                 for each, part in zip(target.elts, self._parts(value, target.elts), strict=True):
                     self.store(each, part, scope)
             case ast.Attribute():

@@ -13,7 +13,12 @@ from composer.reports.text import render_finding
 IDIOMS = Path(__file__).parents[2] / 'data' / 'valid' / 'idioms'
 SYSTEM = """
   rover:
-    parameters: {speed: 1.0, mode: {default: slow, choices: [slow, fast]}, unset: {type: integer}}
+    parameters:
+      speed: 1.0
+      mode: {default: slow, choices: [slow, fast]}
+      unset: {type: integer}
+      names: [a, b]
+      gains: [1.0, 2.0]
     parameter_services: true
     state: {distance: 0.0}
     publishers:
@@ -40,7 +45,10 @@ def use(node):
     node.call('enable', True)
     node.call('plan', {})
     node.send_goal('count', 3)
-    return node.parameters.speed, node.parameters.mode, node.parameters.unset
+    return (
+        *(node.parameters.speed, node.parameters.mode, node.parameters.unset),
+        *(node.parameters.names, node.parameters.gains),
+    )
 """
 HEAD = """
 import asyncio
@@ -53,9 +61,11 @@ import datetime
 import enum
 import functools
 import itertools
+import json
 import math
 import pathlib
 import random
+import re
 import rclpy.duration
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry, Path
@@ -212,6 +222,25 @@ WRONG = {
     "node.create_client('std_srvs/msg/SetBool', 'made')": 'unknown-type',
     "node.create_publisher(Odometry, 'made'); node.publish('made', {'poze': {}})": 'unknown-field',
     "node.create_publisher('std_msgs/msg/Int8', 'made'); node.publish('made', 1.5)": 'field-type',
+    "node.publish('scan', {'header': {'frame_id': pathlib.Path.home() / 'x'}})": 'field-type',
+    "node.publish('scan', {'header': {'frame_id': re.match('a', m.child_frame_id)}})": 'field-type',
+    't = Twist(); t.linear.x = 1': 'field-type',
+    'Vector3(y=len(m.child_frame_id))': 'field-type',
+    'x, y, z = m.pose.pose.position': 'bad-call',
+    'json.dumps({"at": m, "of": open("x")}, indent=2)': 'bad-call',
+    'node.parameters.names.strip()': 'unknown-attribute',
+    "print(node.parameters.gains['p'])": 'bad-call',
+    "node.publish('scan', {'header': {'frame_id': node.parameters.names}})": 'field-type',
+    "print(node.parameters.names == 'a')": 'never-equal',
+    # names of which a part is computed
+    "node.publish(f'comand_{m.child_frame_id}', {})": 'unknown-publisher',
+    "node.publish('comand_%s' % m.child_frame_id, {})": 'unknown-publisher',
+    "node.publish('comand_' + m.child_frame_id, {})": 'unknown-publisher',
+    "node.publish('comand_{}'.format(m.child_frame_id), {})": 'unknown-publisher',
+    "node.publish('_'.join(['comand', m.child_frame_id]), {})": 'unknown-publisher',
+    "node.call(f'{m.child_frame_id}_go', True)": 'unknown-service-client',
+    "print(node.parameters[f'{m.child_frame_id}_speed'])": 'unknown-parameter',
+    "print(getattr(node.parameters, f'gain_{m.child_frame_id}'))": 'unknown-parameter',
     "node.publish('level', node.parameters.unset)": 'no-value',
     'print(node.parameters.unset * 2)': 'no-value',
     'print(m.pose.covariance[36])': 'bad-index',
@@ -339,6 +368,23 @@ RIGHT = [
     "gains = defaultdict(float, p=1.0); print(gains['d'])",
     "gains = {'p': 1.0}; fill(gains); print(gains['d'])",
     "try:\n    print({'p': 1.0}['d'])\nexcept KeyError:\n    pass",
+    'found = re.match("a", m.child_frame_id)\nif found: print(found.group(1) + "x")',
+    "node.publish('scan', {'header': {'frame_id': str(pathlib.Path.home() / 'x')}})",
+    't = Twist(); t.linear.x = 1.0; t.linear.y = float(m.child_frame_id)',
+    "node.publish('command', {'linear': {'x': 1}})",
+    "json.dumps({'at': m.child_frame_id, 'of': [1]}, indent=2)",
+    'json.dumps({"at": m}, default=str)',
+    'print(Counter("a") + Counter("b"))',
+    'a, b = node.parameters.gains\nfor each in node.parameters.names: print(each.strip())',
+    'if isinstance(node.parameters.gains, list) or hasattr(node.parameters.gains, "x"): print()',
+    "node.publish('scan', {'ranges': node.parameters.gains + [1.0]})",
+    'print(node.parameters.gains[0] * 2, sum(node.parameters.gains), node.parameters.gains == [1])',
+    "node.publish(f'com{m.child_frame_id}', {})",
+    "node.publish('{}mand'.format(m.child_frame_id), {})",
+    "node.publish(m.child_frame_id + 'l', {})",
+    "node.create_publisher(Twist, 'comand_x'); node.publish(f'comand_{m.child_frame_id}', {})",
+    "print(node.parameters[f'use_{m.child_frame_id}'])",
+    "print('comand_' + m.child_frame_id)",
     'if type(m).__module__ == node.parameters.mode: print(m.velocity)',
     "if m.__class__.__module__.startswith('geometry'): print(m.velocity)",
     "if 'Twist' in str(type(m)): print(m.velocity)",
@@ -662,3 +708,30 @@ def test_a_way_that_may_give_no_response_is_a_warning(check, body, line):
 @pytest.mark.parametrize('body', ANSWERED)
 def test_a_response_on_all_ways_has_no_finding(check, body):
     assert check(ANSWER, f'def use(node, request):\n    {body}\n') == []
+
+
+CREATED = """
+    def begin(node):
+        node.create_service('std_srvs/srv/Trigger', '~/go', go)
+
+
+    def go(node, request):
+        return {answer}
+    """
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('answer', 'rule'),
+    [
+        ('{"ok": True}', 'unknown-field'),
+        ('{"success": 1}', 'field-type'),
+        ('True', 'field-type'),
+        ('{"success": True}', None),
+        ('node.state.answer', None),
+    ],
+)
+def test_the_response_of_a_created_service_is_checked(check, answer, rule):
+    nodes = '\n  rover: {state: {answer: null}, on_start: parts:begin}\n'
+    found = check(nodes, CREATED.replace('{answer}', answer))
+    assert [each for _, each in found] == ([rule] if rule else [])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import itertools
+import json
 import math
 import operator
 import re
@@ -46,11 +47,13 @@ _BY_TYPE: dict[type, str] = {
     'textwrap.dedent textwrap.fill textwrap.indent textwrap.shorten time.asctime time.ctime '
     'time.strftime',
     bytes: 'builtins.bytes os.urandom pickle.dumps struct.pack',
-    Path: 'pathlib.Path pathlib.Path.cwd pathlib.Path.home pathlib.PurePath',
+    type(Path()): 'pathlib.Path pathlib.Path.cwd pathlib.Path.home pathlib.PurePath',
     datetime: 'datetime.datetime datetime.datetime.now datetime.datetime.fromtimestamp '
     'datetime.datetime.utcnow datetime.datetime.today datetime.datetime.fromisoformat',
     date: 'datetime.date datetime.date.today',
     timedelta: 'datetime.timedelta',
+    re.Match: 're.match re.search re.fullmatch',
+    re.Pattern: 're.compile',
     UUID: 'uuid.UUID uuid.uuid1 uuid.uuid3 uuid.uuid4 uuid.uuid5',
     Decimal: 'decimal.Decimal',
     Fraction: 'fractions.Fraction',
@@ -131,6 +134,7 @@ COMPUTED: dict[str, Callable[..., Any]] = {
 }
 TAKING: dict[str, Callable[..., Any]] = {
     **{f'builtins.{each.__name__}': each for each in (enumerate, iter, range, zip)},
+    'json.dumps': json.dumps,
     'time.sleep': lambda seconds: range(0) if seconds < 0 else None,
 }
 # Called with containers whose items may be anything.
@@ -180,6 +184,7 @@ _METHODS: dict[type, dict[type, str]] = {
     },
     list: {int: 'count index'},
     tuple: {int: 'count index'},
+    re.Pattern: {re.Match: 'match search fullmatch'},
 }
 METHODS: dict[type, dict[str, type]] = {
     owner: {name: kind for kind, names in kinds.items() for name in names.split()}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from array import array
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice, product
 from math import prod
@@ -96,18 +98,21 @@ def arrange(function: Callable[..., Any], arguments: Iterable[Value], place: Pla
     return made.call_plainly(function, *given)
 
 
-def refusal(function: Callable[..., Any], *arguments: Value) -> str | None:
+def refusal(function: Callable[..., Any], *arguments: Value, **named: Value) -> str | None:
     """Return Python's own words if it refuses the types of some values, whatever they are."""
-    several = [[each for each in alternatives(value) if not is_none(each)] for value in arguments]
+    given = (*arguments, *named.values())
+    several = [[each for each in alternatives(value) if not is_none(each)] for value in given]
     if not all(several) or prod(map(len, several)) > _MOST_TRIED:
         return None
-    found = {_refusal(function, *each) for each in product(*several)}
+    found = {_refusal(function, [*named], *each) for each in product(*several)}
     return None if None in found else min(filter(None, found))
 
 
-def _refusal(function: Callable[..., Any], *arguments: Value) -> str | None:
+def _refusal(function: Callable[..., Any], names: list[str], *arguments: Value) -> str | None:
+    count = len(arguments) - len(names)
     try:
-        function(*map(_sample, arguments))
+        samples = [_sample(each, function) for each in arguments]
+        function(*samples[:count], **dict(zip(names, samples[count:], strict=True)))
     except TypeError as error:
         return str(error)
     except Exception:  # noqa: BLE001
@@ -115,7 +120,7 @@ def _refusal(function: Callable[..., Any], *arguments: Value) -> str | None:
     return None
 
 
-def _sample(value: Value) -> Any:
+def _sample(value: Value, function: Callable[..., Any] | None = None) -> Any:
     """Return some value of the same type.
 
     Raises:
@@ -127,7 +132,12 @@ def _sample(value: Value) -> Any:
         case Scalar() if issubclass(value.kind, BaseException):
             return value.kind()
         case Sequence() if value.items and not value.is_lost and value.kind in _BUILDERS:
-            return _BUILDERS[value.kind](_sample(item) for item, _ in value.items[:_MOST_TRIED])
+            return _BUILDERS[value.kind](
+                _sample(item, function) for item, _ in value.items[:_MOST_TRIED]
+            )
+        case Mapping(entries=entries) if function is json.dumps and not value.is_lost:
+            # What else it is given may be a counter, which has operators.
+            return {key: _json(held) for key, (held, _) in entries.items()}
         case Message():
             return _MESSAGE
         case ArrayField() if value.type.array != 'fixed' and not value.type.nested:
@@ -135,6 +145,12 @@ def _sample(value: Value) -> Any:
                 return ['1']
             return array(_CODES.get(value.type.kind, 'b'), [1])
     raise NotKnownError
+
+
+def _json(value: Value) -> Any:
+    with suppress(NotKnownError):
+        return _sample(value, json.dumps)
+    return None
 
 
 class Computation:

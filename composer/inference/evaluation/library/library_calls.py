@@ -146,9 +146,10 @@ class LibraryCalls(Part):
         self, function: Callable[..., Any] | None, arguments: Arguments, place: Place
     ) -> None:
         """Report that a function of Python does not take values of the types of the arguments."""
-        if function is not None and not (arguments.named or arguments.is_open):
+        if function is not None and not arguments.is_open:
             given = [each.value for each in arguments.positional]
-            self._evaluator.refuse(place, function, *given)
+            named = {name: each.value for name, each in arguments.named}
+            self._evaluator.refuse(place, function, *given, **named)
 
     def _compute(self, name: str, arguments: Arguments, place: Place) -> Value | None:
         """Return what a function returns if all that it is given is known."""
@@ -196,6 +197,8 @@ class LibraryCalls(Part):
         for each in alternatives(name.value):
             if not isinstance(each, Constant) or not isinstance(each.value, str):
                 self._evaluator.escape(owner.value)
+                if owner.value == PartOfNode('parameters') and not has_default:
+                    self._evaluator.run.use_any('parameter', each, name.place)
                 return UNKNOWN
             with self._evaluator.run.guard(is_guard=has_default):
                 where = name_place(name, each)
@@ -233,8 +236,9 @@ class LibraryCalls(Part):
             contained = self._evaluator.attributes.contained(ast.In(), name.value, owner.value)
             self._evaluator.attributes.note_containment(name.value, owner.value, name.place)
             return contained or UNKNOWN
-        if isinstance(owner.value, Scalar | Constant) and isinstance(name.value.value, str):
-            return constant(hasattr(owner.value.kind, name.value.value))
+        kind = getattr(owner.value, 'kind', list)
+        if isinstance(owner.value, Scalar | Constant) and kind is not list:
+            return constant(hasattr(kind, str(name.value.value)))
         if isinstance(owner.value, Message):
             if name.value.value == 'get_fields_and_field_types':
                 return constant(value=True)
@@ -313,7 +317,7 @@ def is_instance(value: Value, wanted: Value) -> bool | None:
 
 
 def _is_one_instance(value: Value, wanted: Value) -> bool | None:
-    if isinstance(value, Scalar) and value.unset:
+    if isinstance(value, Scalar) and (value.unset or value.kind is list):
         return None
     if isinstance(value, Message) and isinstance(wanted, MessageClass):
         # Of two packages with the same type, either may be meant.

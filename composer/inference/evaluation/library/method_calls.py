@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from composer.inference.evaluation.library.known_functions import METHODS, call_method
 from composer.inference.evaluation.part import Part
 from composer.inference.values import (
+    ANY,
     NONE,
     UNKNOWN,
     Argument,
@@ -21,8 +23,10 @@ from composer.inference.values import (
     Value,
     chosen_by,
     constant,
+    held_by,
     is_chosen,
     join,
+    pattern_of,
 )
 from composer.python_source.changed_names import CHANGING
 
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 
 # How many parts `partition` makes.
 _PARTS = 3
+_REPLACED = re.compile(r'\{[^{}]*\}')
 _VIEWS: dict[str, type] = {
     'items': type({}.items()),
     'keys': type({}.keys()),
@@ -114,6 +119,7 @@ class MethodCalls(Part):
             if known is not None:
                 return known
             self._evaluator.library.refuse(call_method(name), whole, place)
+        pattern = _pattern(owner, name, arguments)
         self._evaluator.calls.escape_all(arguments)
         if result is list:
             return Sequence([(Scalar(str), place)], list, is_open=True, origin=place)
@@ -122,7 +128,8 @@ class MethodCalls(Part):
         if result is set:
             return Sequence([], set, is_open=True)
         if result is not None:
-            return Scalar(result, max(is_chosen(owner), chosen_by(arguments)))
+            chosen = max(is_chosen(owner), chosen_by(arguments))
+            return Scalar(result, chosen, pattern=pattern)
         if not isinstance(owner, Constant | Scalar):
             self._evaluator.escape(owner)
         return UNKNOWN
@@ -272,3 +279,14 @@ class MethodCalls(Part):
         else:
             owner.items[:] = made.items
         return NONE
+
+
+def _pattern(owner: Value, name: str, arguments: Arguments) -> str:
+    """Return what is known of the text that `format` or `join` makes."""
+    first = arguments.get(0, '')
+    if isinstance(owner, Constant) and name == 'format':
+        return _REPLACED.sub(ANY, owner.value)
+    if isinstance(owner, Constant) and name == 'join' and first and not arguments.is_open:
+        is_known = isinstance(first.value, Sequence) and first.value.is_whole
+        return owner.value.join(map(pattern_of, held_by(first.value))) if is_known else ''
+    return ''
