@@ -54,6 +54,7 @@ PROCESS = {
 }
 TOP_ANSWER = {
     'version': 1,
+    'name': 'robot',
     'period': 3,
     'period_sec': 1,
     'has_cpu': False,
