@@ -160,6 +160,7 @@ def test_a_call_that_holds_the_interpreter_is_reported(compose):
     places = [next(n for n, line in enumerate(child.lines) if each in line) for each in told]
     assert places == sorted(places)
     child.wait_for_line('[INFO] [composer]: the system answers again')
+    child.wait_until_ready()
     assert child.stop() == 0
 
 

@@ -48,8 +48,10 @@ class Containers(Part):
                 return owner
             case Mapping() | Sequence() | Constant() | Scalar() | Instance():
                 return self._evaluator.methods.call(owner, name, arguments, place)
-            case ArrayField() if name in ('tolist', 'copy'):
+            case ArrayField() if name == 'copy':
                 return self._evaluator.read_only.copy_of(owner, place)
+            case ArrayField() if name == 'tolist':
+                return Sequence([(self._evaluator.item_of(owner), place)], list, is_open=True)
             case ArrayField() if name in ('append', 'insert'):
                 item = arguments.get(int(name == 'insert'), '')
                 if item is not None and isinstance(item.value, Message):
