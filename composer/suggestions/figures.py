@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.errors import ComposerError
@@ -27,8 +28,6 @@ class EntityFigures:
     Attributes:
         node: The full name of its node.
         cpu: How many processors its calls used on average.
-        gil: The share of the time in which they held the interpreter.
-        is_gil_known: Whether that was measured; else it is `cpu`.
         rate_hz: Calls in a second.
         lost_hz: Messages that were dropped from its queue in a second.
         worker: Where it ran; empty for the process of the system.
@@ -38,11 +37,9 @@ class EntityFigures:
     kind: str
     name: str
     cpu: float
-    gil: float
     rate_hz: float
     lost_hz: float = 0.0
     worker: str = ''
-    is_gil_known: bool = True
 
 
 @record
@@ -67,49 +64,31 @@ class Averages:
 
     def __init__(self) -> None:
         self._sums: dict[_Task, list[float]] = {}
-        self._without_gil: dict[_Task, list[float]] = {}
         self._workers: dict[_Task, str] = {}
 
-    def add(
-        self,
-        task: _Task,
-        cpu: float,
-        gil: float | None,
-        figures: tuple[float, float],
-        worker: str,
-    ) -> None:
+    def add(self, task: _Task, cpu: float, rate_hz: float, lost_hz: float, worker: str) -> None:
         """Take figures of an entity.
 
         Args:
             task: Node, kind, name and key of the entity.
-            gil: `None` if it is not known of the period.
-            figures: `rate_hz`, and messages that were dropped.
             worker: Where it ran.
         """
         self._workers[task] = worker
-        all_sums = self._without_gil if gil is None else self._sums
-        sums = all_sums.setdefault(task, [0.0] * 5)
-        for index, value in enumerate((cpu, cpu if gil is None else gil, *figures, 1.0)):
+        sums = self._sums.setdefault(task, [0.0] * 4)
+        for index, value in enumerate((cpu, rate_hz, lost_hz, 1.0)):
             sums[index] += value
 
     def entities(self) -> tuple[EntityFigures, ...]:
-        """Return the averages, in the order of names; what an entity has several of is one.
-
-        There are none if it is not known of any how long it held the interpreter.
-        """
-        if not self._sums:
-            return ()
+        """Return the averages, in the order of names; what an entity has several of is one."""
         return tuple(
             EntityFigures(
                 *task[:3],
-                cpu=sums[0] / sums[4],
-                gil=sums[1] / sums[4],
-                rate_hz=sums[2] / sums[4],
-                lost_hz=sums[3] / sums[4],
+                cpu=sums[0] / sums[3],
+                rate_hz=sums[1] / sums[3],
+                lost_hz=sums[2] / sums[3],
                 worker=self._workers[task],
-                is_gil_known=task in self._sums,
             )
-            for task, sums in sorted({**self._without_gil, **self._sums}.items())
+            for task, sums in sorted(self._sums.items())
         )
 
 
@@ -176,7 +155,9 @@ class _DiagnosticsReader:
                 self.cores = int(values['cores'])
             task = _TASK.fullmatch(status.name)
             if task is not None and values.get('cpu (%)') and 'rate (Hz)' in values:
-                self._add(status.name, task, values, now_sec)
+                # Somebody else may have written figures that are no numbers.
+                with suppress(ValueError):
+                    self._add(status.name, task, values, now_sec)
 
     def _add(
         self, name: str, task: re.Match[str], values: Mapping[str, str], now_sec: float
@@ -186,12 +167,11 @@ class _DiagnosticsReader:
         self._lost[name] = now_sec, lost
         passed_sec = now_sec - before_sec
         lost_hz = (lost - before) / passed_sec if passed_sec > 0 else 0.0
-        gil = values.get('GIL (%)')
         self.averages.add(
             (task['node'], task['kind'], task['name'] or '', name),
             float(values['cpu (%)']) / _PERCENT,
-            float(gil) / _PERCENT if gil else None,
-            (float(values['rate (Hz)']), lost_hz),
+            float(values['rate (Hz)']),
+            lost_hz,
             values.get('worker', ''),
         )
 
@@ -204,10 +184,7 @@ class _DiagnosticsReader:
             raise ComposerError(message, help=advice)
         if not self.averages.entities():
             message = f"'{path}' does not say what the calls of '{self._system}' cost"
-            advice = (
-                'its interpreter could not be watched, or an older Composer recorded it: '
-                'GIL (%) and cpu (%) are missing'
-            )
+            advice = "the figures 'cpu (%)' are missing"
             raise ComposerError(message, help=advice)
 
 
@@ -225,6 +202,6 @@ def average_answers(answers: Iterable[Mapping[str, Any]]) -> tuple[EntityFigures
             task = each['node'], each['kind'], each['name'], each['key']
             lost = each['dropped'] - before.get(task, each['dropped'])
             before[task] = each['dropped']
-            figures = each['rate_hz'], lost / answer['period_sec']
-            averages.add(task, each['cpu'], each['gil'], figures, each['worker'])
+            lost_hz = lost / answer['period_sec']
+            averages.add(task, each['cpu'], each['rate_hz'], lost_hz, each['worker'])
     return averages.entities()

@@ -20,18 +20,14 @@ class NodeLoad:
     Attributes:
         name: Its full name.
         cpu: How many processors its calls used on average.
-        gil: The share of the time in which they held the interpreter.
         worker: Where it ran: a worker, or `''` for the process of the system.
         is_measured: Whether there are figures of it.
-        is_gil_known: Whether `gil` was measured of all of it; else `cpu` stands in its place.
     """
 
     name: str
     cpu: float
-    gil: float
     worker: str = ''
     is_measured: bool = True
-    is_gil_known: bool = True
 
 
 @record

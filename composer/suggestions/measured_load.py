@@ -87,10 +87,8 @@ def _load_of(node: NodeSpec, entities: Iterable[EntityFigures]) -> NodeLoad:
     return NodeLoad(
         node.full_name,
         cpu=sum(each.cpu for each in own),
-        gil=min(1.0, sum(each.gil for each in own)),
         worker=node.worker,
         is_measured=bool(own),
-        is_gil_known=all(each.is_gil_known for each in own),
     )
 
 
@@ -175,5 +173,5 @@ def _demand(
         return most
     held: dict[str, float] = {}
     for each in nodes:
-        held[each.worker] = held.get(each.worker, 0.0) + each.gil
+        held[each.worker] = held.get(each.worker, 0.0) + each.cpu
     return float('inf') if max(held.values(), default=0.0) >= _SATURATED else 1.0

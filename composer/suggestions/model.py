@@ -32,11 +32,11 @@ class Cost:
     """What a split needs to do what was done while the system was measured.
 
     Attributes:
-        busiest: The share of the time that the interpreter is held which is held most, or that
-            the cores are used, whichever is more. More than 1 cannot be.
+        busiest: How much of a core the busiest process uses, or the share of all cores that is
+            used, whichever is more. More than 1 cannot be.
         cpu: How many processors all of it uses.
         crossing: How many of these go into messages between processes.
-        by_worker: How long the interpreter of each process is held.
+        by_worker: How much of a core the callbacks of each process use.
     """
 
     busiest: float
@@ -47,18 +47,18 @@ class Cost:
 
 def cost_of(load: SystemLoad, split: Split) -> Cost:
     """Return what a split costs."""
-    gil = dict.fromkeys(sorted(set(split.values())), 0.0)
+    used = dict.fromkeys(sorted(set(split.values())), 0.0)
     for node in load.nodes:
-        gil[split[node.name]] += node.gil
+        used[split[node.name]] += min(1.0, node.cpu)
     crossing = 0.0
     for worker, seconds in _crossings(load, split):
-        gil[worker] += seconds
+        used[worker] += seconds
         crossing += seconds
     cpu = max(0.0, sum(node.cpu for node in load.nodes) + crossing)
     # A node's own callbacks mostly exclude each other.
     longest = max((node.cpu for node in load.nodes), default=0.0)
-    busiest = max(*gil.values(), cpu / load.free_cores, min(longest, 1.0)) if gil else 0.0
-    return Cost(busiest, cpu, crossing, gil)
+    busiest = max(*used.values(), cpu / load.free_cores, min(longest, 1.0)) if used else 0.0
+    return Cost(busiest, cpu, crossing, used)
 
 
 def _crossings(load: SystemLoad, split: Split) -> Iterable[tuple[str, float]]:

@@ -35,8 +35,8 @@ class _Group:
     nodes: Sequence[NodeLoad]
 
     @property
-    def gil(self) -> float:
-        return sum(node.gil for node in self.nodes)
+    def cpu(self) -> float:
+        return sum(node.cpu for node in self.nodes)
 
     def in_worker(self, name: str) -> dict[str, str]:
         """Return where its nodes are if it is in a worker."""
@@ -74,13 +74,13 @@ def _group(load: SystemLoad) -> list[_Group]:
     for node in load.nodes:
         members.setdefault(root(node.name), []).append(node)
     groups = [_Group(sorted(each, key=lambda node: node.name)) for each in members.values()]
-    return sorted(groups, key=lambda each: (-each.gil, each.nodes[0].name))
+    return sorted(groups, key=lambda each: (-each.cpu, each.nodes[0].name))
 
 
 def _is_movable(load: SystemLoad, group: _Group) -> bool:
     # Of a node that did nothing, it is not known what it needs.
     is_fixed = any(node.name in load.fixed for node in group.nodes)
-    return not is_fixed and any(node.cpu or node.gil for node in group.nodes)
+    return not is_fixed and any(node.cpu for node in group.nodes)
 
 
 def _assign(load: SystemLoad, movable: Sequence[_Group], count: int) -> dict[str, str]:
@@ -90,11 +90,11 @@ def _assign(load: SystemLoad, movable: Sequence[_Group], count: int) -> dict[str
     busy = dict.fromkeys(['', *_name_workers(load, count)], 0.0)
     for node in load.nodes:
         if node.name not in moving:
-            busy[node.worker] = busy.get(node.worker, 0.0) + node.gil
+            busy[node.worker] = busy.get(node.worker, 0.0) + node.cpu
     for group in movable:
         # Of equals, the first.
         name = min(busy, key=lambda each: busy[each])
-        busy[name] += group.gil
+        busy[name] += group.cpu
         split.update({node.name: name for node in group.nodes})
     return split
 

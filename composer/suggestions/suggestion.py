@@ -56,7 +56,7 @@ def _named_by_nodes(load: SystemLoad, split: Split) -> dict[str, str]:
     """Return a split whose new workers have the names of their largest nodes."""
     old = {*load.taken, *load.present.values(), ''}
     names = {name: name for name in old}
-    for node in sorted(load.nodes, key=lambda each: (-each.gil, -each.cpu, each.name)):
+    for node in sorted(load.nodes, key=lambda each: (-each.cpu, each.name)):
         worker = split[node.name]
         if worker not in names:
             names[worker] = _free_name(node.name.rpartition('/')[2], set(names.values()))
@@ -73,10 +73,10 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 
 def _explain_none(load: SystemLoad, before: Cost, split: Split) -> str:
     if load.demand <= 1.0:
-        held = max(before.by_worker.values(), default=0.0)
+        busiest = max(before.by_worker.values(), default=0.0)
         return (
-            'nothing is late, and no interpreter is held all the time '
-            f'(the busiest {held:.0%}): there is nothing to gain'
+            'nothing is late, and no process is busy all the time '
+            f'(the busiest {busiest:.0%} of a core): there is nothing to gain'
         )
     if len(load.nodes) - len(load.fixed) < 1:
         return 'no node can be moved'

@@ -60,8 +60,8 @@ def _table(suggestion: Suggestion) -> list[str]:
     lines = []
     for worker in sorted(set(split.values())):
         nodes = [node for node in load.nodes if split[node.name] == worker]
-        busy = [node for node in nodes if node.gil or node.cpu]
-        named = ', '.join(f'{node.name} {node.gil:.0%}' for node in busy)
+        busy = [node for node in nodes if node.cpu]
+        named = ', '.join(f'{node.name} {node.cpu:.0%}' for node in busy)
         unknown = [node for node in nodes if not node.is_measured]
         idle = len(nodes) - len(busy) - len(unknown)
         parts = (
@@ -73,9 +73,6 @@ def _table(suggestion: Suggestion) -> list[str]:
         lines.append(f'  {what}: {", ".join(filter(None, parts))}')
     if tells_others(load):
         lines.append(f'  other programs use {load.others:.1f} of {load.cores} cores')
-    guessed = ', '.join(node.name for node in load.nodes if not node.is_gil_known)
-    if guessed:
-        lines.append(f'  the GIL of these is not known, and taken to be their CPU: {guessed}')
     if suggestion.after.crossing > 0:
         # What crosses already is in the figures of the nodes.
         more = ' more' if any(load.present.values()) else ''
@@ -100,8 +97,7 @@ def render_json(suggestion: Suggestion, system: str, keys: Mapping[str, str]) ->
             {
                 'node': node.name,
                 'cpu': node.cpu,
-                'gil': node.gil,
-                'gil_known': node.is_measured and node.is_gil_known,
+                'measured': node.is_measured,
                 'worker': node.worker,
                 'suggested': suggestion.moves.get(node.name, node.worker),
             }
@@ -119,5 +115,5 @@ def _describe_cost(cost: Any) -> dict[str, Any]:
         'busiest': cost.busiest,
         'cpu': cost.cpu,
         'crossing': cost.crossing,
-        'gil': dict(cost.by_worker),
+        'processes': dict(cost.by_worker),
     }

@@ -53,7 +53,7 @@ def test_what_this_computer_tells_is_understood():
 
 
 def load_of(others, *shares, cores=2):
-    nodes = [NodeLoad(f'/{name}', each, each) for name, each in zip('abcd', shares, strict=False)]
+    nodes = [NodeLoad(f'/{name}', each) for name, each in zip('abcd', shares, strict=False)]
     return SystemLoad(nodes, [], cores=cores, others=others)
 
 

@@ -16,9 +16,9 @@ from composer.suggestions.text import render_text
 MEGABYTE = 1e6
 
 
-def load_of(gil, flows=(), **more):
-    """Return the load of nodes `/a`, `/b`, ... that compute in Python only."""
-    nodes = [NodeLoad(f'/{name}', each, each) for name, each in zip('abcdefgh', gil, strict=False)]
+def load_of(shares, flows=(), **more):
+    """Return the load of nodes `/a`, `/b`, ..."""
+    nodes = [NodeLoad(f'/{name}', each) for name, each in zip('abcdefgh', shares, strict=False)]
     return SystemLoad(nodes=nodes, flows=flows, **{'cores': 2, **more})
 
 
@@ -28,10 +28,7 @@ def loads(draw):
     names = [f'/{each}' for each in 'abcdefg'[:count]]
     share = st.floats(0, 1).map(lambda each: each / count)
     workers = st.sampled_from(['', '', 'old', 'older'])
-    nodes = []
-    for name in names:
-        gil = draw(share)
-        nodes.append(NodeLoad(name, gil + draw(share), gil, draw(workers)))
+    nodes = [NodeLoad(name, draw(share), draw(workers)) for name in names]
     flow = st.builds(
         Flow,
         st.sampled_from(['/x', '/y']),
@@ -120,20 +117,18 @@ def test_with_more_cores_there_are_more_processes():
     assert result.gain == pytest.approx(0.95 / 0.24, rel=0.05)
 
 
-def test_what_lets_go_of_the_interpreter_needs_no_process_of_its_own():
-    nodes = [NodeLoad('/a', 0.9, 0.05), NodeLoad('/b', 0.9, 0.05)]
-    result = suggest_split(SystemLoad(nodes, [], cores=2))
+def test_no_split_pays_where_all_cores_are_used():
+    result = suggest_split(load_of([0.9, 0.9]))
     assert result.moves == {}
     assert result.reason == 'all 2 cores are used already (1.8)'
 
 
 def test_who_exchanges_big_messages_stays_together():
-    gil = [0.25, 0.23, 0.25, 0.23]
     heavy = [
         Flow('/x', '/a', '/b', 30.0, 2 * MEGABYTE),
         Flow('/y', '/c', '/d', 30.0, 2 * MEGABYTE),
     ]
-    result = suggest_split(load_of(gil, heavy))
+    result = suggest_split(load_of([0.25, 0.23, 0.25, 0.23], heavy))
     split = {**dict.fromkeys(['/a', '/b', '/c', '/d'], ''), **result.moves}
     assert split['/a'] == split['/b'] != split['/c'] == split['/d']
     assert result.after.crossing == 0
@@ -151,8 +146,8 @@ def test_no_split_pays_where_messages_cost_more():
     [
         (
             load_of([0.2, 0.1], demand=1.0),
-            'nothing is late, and no interpreter is held all the time '
-            '(the busiest 30%): there is nothing to gain',
+            'nothing is late, and no process is busy all the time '
+            '(the busiest 30% of a core): there is nothing to gain',
         ),
         (load_of([0.95, 0.01]), '/a alone needs a core (95%), wherever it runs'),
         (load_of([0.5, 0.45], cores=1), 'all 1 core are used already (0.9)'),
@@ -164,7 +159,7 @@ def test_it_is_said_why_no_split_pays(load, reason):
 
 
 def test_new_workers_have_the_names_of_their_largest_nodes():
-    nodes = [NodeLoad('/eyes/left', 0.5, 0.5), NodeLoad('/eyes/right', 0.45, 0.45, '')]
+    nodes = [NodeLoad('/eyes/left', 0.5), NodeLoad('/eyes/right', 0.45)]
     result = suggest_split(SystemLoad(nodes, [], 2, taken=frozenset({'left', 'right'})))
     assert set(result.moves.values()) <= {'left_2', 'right_2'}
     assert result.moves
@@ -182,14 +177,14 @@ def test_what_crosses_is_sent_once_and_taken_by_each():
 
 @pytest.mark.parametrize(('worker', 'more'), [('', ''), ('old', ' more')])
 def test_it_is_said_whether_messages_cross_already(worker, more):
-    nodes = [NodeLoad('/a', 0.5, 0.5), NodeLoad('/b', 0.45, 0.45), NodeLoad('/c', 0, 0, worker)]
+    nodes = [NodeLoad('/a', 0.5), NodeLoad('/b', 0.45), NodeLoad('/c', 0, worker)]
     flows = [Flow('/x', '/a', '/b', 10.0, MEGABYTE)]
     text = render_text(suggest_split(SystemLoad(nodes, flows, cores=4)), 'it', '', '')
     assert f'  messages between them: 4% of a core{more}\n' in text
 
 
 def test_what_crossed_already_is_won_when_it_does_no_more():
-    nodes = [NodeLoad('/a', 0.3, 0.3), NodeLoad('/b', 0.3, 0.3, 'p')]
+    nodes = [NodeLoad('/a', 0.3), NodeLoad('/b', 0.3, 'p')]
     load = SystemLoad(nodes, [Flow('/x', '/a', '/b', 10.0, MEGABYTE)], 2)
     assert cost_of(load, load.present).crossing == pytest.approx(0)
     assert cost_of(load, {'/a': '', '/b': ''}).crossing < 0

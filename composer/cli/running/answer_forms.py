@@ -35,14 +35,13 @@ TOP: Final[Form] = {
             'worker': str,
             'pid': int,
             'cores': int,
-            **dict.fromkeys(('cpu', 'gil', 'gil_wait_mean_ms', 'gil_wait_max_ms'), _FIGURE),
+            **dict.fromkeys(('cpu', 'gil_wait_mean_ms', 'gil_wait_max_ms'), _FIGURE),
         }
     ],
     'entities': [
         {
             **dict.fromkeys(('node', 'worker', 'kind', 'name', 'key'), str),
-            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'queued'), _FIGURE),
-            **dict.fromkeys(('cpu', 'gil'), _FIGURE),
+            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued'), _FIGURE),
             **dict.fromkeys(('errors', 'dropped', 'late', 'skipped'), float),
             'delivery': (NoneType, str),
             'delivery_reason': str,

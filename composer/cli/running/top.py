@@ -72,7 +72,7 @@ def print_health(document: dict[str, Any], view: View, format_name: str) -> None
     """Print what a system says of its entities."""
     entities = select_entities(document['entities'], view)
     if format_name == 'json':
-        found = {'gil_kept_by': find_worst(document), 'entities': entities}
+        found = {'kept_waiting_by': find_worst(document), 'entities': entities}
         click.echo(json.dumps({**document, **found}, indent=2))
     else:
         lines = map(describe_worst, find_worst(document))

@@ -60,7 +60,6 @@ COLUMNS = (
     Column('P99 MS', _field('p99_ms'), _times, 12),
     Column('MAX MS', _field('max_ms'), _times, 13),
     Column('CPU', _field('cpu'), lambda value: f'{value:.1%}', 2),
-    Column('GIL', _field('gil'), lambda value: f'{value:.1%}', 14),
     Column('QUEUE', _field('queued'), str, 6),
     Column('DROPPED', _field('dropped'), str, 5),
     Column('LATE', _missed, str, 10),
@@ -76,10 +75,10 @@ SORT_NAMES = {
 }
 DEFAULT_SORT = 'cpu'
 # Names are at least so long before columns of a higher rank than this have a place.
-_READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 14
+_READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 13
 # A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
 _WAITED_MS = 0.5
-_KEPT_SHARE = 0.1
+_BUSY = 0.1
 
 
 @record
@@ -109,11 +108,12 @@ def select_entities(entities: Sequence[Mapping[str, Any]], view: View) -> list[M
 
 
 def find_worst(document: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return which entities kept the interpreter (GIL) from others that waited for it.
+    """Return which entities used most of a core while others waited for the interpreter (GIL).
 
     Returns:
         One at most for each process: `host` if there are several, `worker`, `node`, `entity`,
-        its share `gil`, and how long the others waited, `wait_mean_ms` and `wait_max_ms`.
+        its share of a core `cpu`, and how long the others waited, `wait_mean_ms` and
+        `wait_max_ms`.
     """
     return [worst for each in document['processes'] if (worst := _worst_of(document, each))]
 
@@ -124,9 +124,9 @@ def _place(each: Mapping[str, Any]) -> tuple[str, str]:
 
 def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[str, Any] | None:
     mates = [each for each in document['entities'] if _place(each) == _place(process)]
-    known = [each for each in mates if each['gil'] is not None]
-    worst = max(known, key=lambda each: float(each['gil']), default=None)
-    if worst is None or worst['gil'] < _KEPT_SHARE:
+    known = [each for each in mates if each['cpu'] is not None]
+    worst = max(known, key=lambda each: float(each['cpu']), default=None)
+    if worst is None or worst['cpu'] < _BUSY:
         return None
     has_others = any(each['node'] != worst['node'] and each['calls'] for each in mates)
     if not has_others or (process['gil_wait_mean_ms'] or 0.0) < _WAITED_MS:
@@ -137,7 +137,7 @@ def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[s
         'worker': worst['worker'],
         'node': worst['node'],
         'entity': _describe(worst).removeprefix(f'{worst["node"]}: '),
-        'gil': worst['gil'],
+        'cpu': worst['cpu'],
         'wait_mean_ms': process['gil_wait_mean_ms'],
         'wait_max_ms': process['gil_wait_max_ms'],
     }
@@ -148,9 +148,9 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
     where = f' in worker {worst["worker"]}' if worst['worker'] else ''
     where += f' on host {worst["host"]}' if 'host' in worst else ''
     return escape(
-        f'{worst["node"]}: {worst["entity"]} keeps the interpreter (GIL){where} '
-        f'{worst["gil"]:.0%} of the time: the others wait {worst["wait_mean_ms"]:.1f} ms for it '
-        f'on average, {worst["wait_max_ms"]:.1f} ms at most'
+        f'{worst["node"]}: {worst["entity"]}{where} uses {worst["cpu"]:.0%} of a core: other '
+        f'callbacks wait {worst["wait_mean_ms"]:.1f} ms for the interpreter (GIL) on average, '
+        f'{worst["wait_max_ms"]:.1f} ms at most'
     )
 
 

@@ -91,7 +91,7 @@ def describe_top(
         'name': state.name,
         'period': latest.number,
         'period_sec': diagnostics.period_sec,
-        'has_cpu': latest.costs is not None and not latest.costs.awaits_samples,
+        'has_cpu': latest.costs is not None,
         'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
         'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
         + [_describe_delivery(key, each, latest.rates) for key, each in deliveries.items()]
@@ -160,7 +160,6 @@ def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
         'p99_ms': times.percentile_ns(_P99) / _NS_PER_MS if calls else None,
         'max_ms': times.most_ns / _NS_PER_MS if calls else None,
         'cpu': report.cpu,
-        'gil': report.kept,
         'queued': report.queued,
         'calls': report.all_calls,
         'errors': report.all_errors,
@@ -181,7 +180,7 @@ def _describe_delivery(
 
 def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[str, Any]:
     node, owner = key
-    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'gil', 'queued')
+    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
     none = ('calls', 'errors', 'dropped', 'late', 'skipped')
     return {
         'node': node,
@@ -204,7 +203,6 @@ def _describe_process(costs: ProcessCosts) -> dict[str, Any]:
         'pid': os.getpid(),
         'cores': costs.cores,
         'cpu': costs.cpu,
-        'gil': costs.held,
         'gil_wait_mean_ms': None if waits is None else waits.mean_ms,
         'gil_wait_max_ms': None if waits is None else waits.max_ms,
     }

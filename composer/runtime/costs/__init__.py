@@ -1,1 +1,1 @@
-"""What calls cost: processor time, and how long they keep the interpreter from the others."""
+"""The processor time of calls, and how long callbacks wait for the interpreter."""

@@ -53,7 +53,6 @@ class StatusWriter:
             self._set('callback time p99 (ms)', f'{times.percentile_ns(_P99) / 1e6:.4f}')
             self._set('callback time max (ms)', f'{times.most_ns / 1e6:.4f}')
         self._set_share('cpu (%)', report.cpu)
-        self._set_share('GIL (%)', report.kept)
         for label, attribute in self._missed.items():
             self._set(label, str(getattr(report.all_missed, attribute)))
         return status
@@ -166,7 +165,6 @@ def _describe_costs(costs: ProcessCosts) -> dict[str, str]:
     return {
         'cores': str(costs.cores),
         'cpu (%)': format_percent(costs.cpu),
-        'GIL (%)': format_percent(costs.held),
         'GIL wait mean (ms)': '' if waits is None else f'{waits.mean_ms:.3f}',
         'GIL wait max (ms)': '' if waits is None else f'{waits.max_ms:.3f}',
     }

@@ -178,9 +178,11 @@ class DiagnosticsPublisher:
         if call_meter.is_on:
             self._registry.add_costs(self._calls.running_calls())
             costs = self._meter.take(period_sec)
-        sampled_ns = None if costs is None else costs.sampled_ns
         reports = self._registry.reports(
-            period_sec, self._calls.overdue_calls(), monotonic_ns(), sampled_ns
+            period_sec,
+            self._calls.overdue_calls(),
+            monotonic_ns(),
+            is_measured=costs is not None,
         )
         before, self._sent = self._sent, {key: each.count for key, each in deliveries.items()}
         rates = {

@@ -36,20 +36,19 @@ class CallTimes:
     Attributes:
         counts: Calls by bucket; most entities use few of them.
         cpu_ns: What they cost the processor, while `call_meter` is on.
-        kept_ns: How long they held the interpreter, while it is on.
     """
 
-    __slots__ = ('counts', 'cpu_ns', 'kept_ns', 'most_ns', 'total_ns')
+    __slots__ = ('counts', 'cpu_ns', 'most_ns', 'total_ns')
 
     def __init__(self) -> None:
         self.counts: dict[int, int] = {}
-        self.cpu_ns = self.kept_ns = 0
+        self.cpu_ns = 0
         self.total_ns = 0
         self.most_ns = 0
 
     def add(self, duration_ns: int) -> None:
         """Count a call that has ended."""
-        cpu_ns, kept_ns = call_meter.lap() if call_meter.is_on else (0, 0)
+        cpu_ns = call_meter.lap() if call_meter.is_on else 0
         units = duration_ns >> _UNIT_BITS
         shift = units.bit_length() - _SUB_BITS - 1
         bucket = (shift << _SUB_BITS) + (units >> shift) if shift > 0 else units
@@ -60,15 +59,9 @@ class CallTimes:
         else:
             counts[bucket] = 1
         self.cpu_ns += cpu_ns
-        self.kept_ns += kept_ns
         self.total_ns += duration_ns
         if duration_ns > self.most_ns:  # noqa: PLR1730 - `max` would be a call
             self.most_ns = duration_ns
-
-    def add_costs(self, cpu_ns: int, kept_ns: int) -> None:
-        """Count what a call has cost until now that runs on."""
-        self.cpu_ns += cpu_ns
-        self.kept_ns += kept_ns
 
     def take(self) -> CallTimes:
         """Return all counts so far, and start again with none."""
@@ -76,7 +69,6 @@ class CallTimes:
         # Nothing is called from here on.
         taken.counts, self.counts = self.counts, taken.counts
         taken.cpu_ns, self.cpu_ns = self.cpu_ns, 0
-        taken.kept_ns, self.kept_ns = self.kept_ns, 0
         taken.total_ns, self.total_ns = self.total_ns, 0
         taken.most_ns, self.most_ns = self.most_ns, 0
         return taken
@@ -122,8 +114,7 @@ class EntityReport:
         overdue_sec: How long a call has been running that exceeds `warn_after`; 0 if none does.
         queued: How many messages wait for it.
         all_calls: Since the start, as the next two.
-        sampled_ns: How long it was sampled in the period who holds the interpreter, 0 if that
-            cannot be known; `None` if nothing was measured of what calls cost.
+        is_measured: Whether the processor time of its calls was measured.
     """
 
     period_sec: float
@@ -136,17 +127,12 @@ class EntityReport:
     all_calls: int
     all_errors: int
     all_missed: MissedCounts
-    sampled_ns: int | None = None
+    is_measured: bool = False
 
     @property
     def cpu(self) -> float | None:
         """The share of a processor that its calls used; `None` if it was not measured."""
-        return None if self.sampled_ns is None else self.times.cpu_ns / 1e9 / self.period_sec
-
-    @property
-    def kept(self) -> float | None:
-        """The share of the time in which its calls held the interpreter; `None` as above."""
-        return min(1.0, self.times.kept_ns / self.sampled_ns) if self.sampled_ns else None
+        return self.times.cpu_ns / 1e9 / self.period_sec if self.is_measured else None
 
 
 class EntityHealth:
@@ -197,14 +183,14 @@ class EntityHealth:
         self._count_missed, self._count_queued = count_missed, count_queued
 
     def report(
-        self, period_sec: float, overdue_sec: float, sampled_ns: int | None = None
+        self, period_sec: float, overdue_sec: float, *, is_measured: bool = False
     ) -> EntityReport:
         """Return the health of the period that ends, and begin a new one.
 
         Args:
             period_sec: How long the period was.
             overdue_sec: How long a call has been running that exceeds `warn_after`.
-            sampled_ns: See `EntityReport`.
+            is_measured: See `EntityReport`.
         """
         times = self.times.take()
         self._calls += times.calls()
@@ -223,7 +209,7 @@ class EntityHealth:
             all_calls=self._calls,
             all_errors=errors,
             all_missed=missed,
-            sampled_ns=sampled_ns,
+            is_measured=is_measured,
         )
 
     def _update_missed(self) -> None:
@@ -269,14 +255,15 @@ class HealthRegistry:
             native = natives.get(call.thread)
             entity = self._entities.get((node, call.owner))
             if call.thread is not None and native is not None and entity is not None:
-                entity.times.add_costs(*call_meter.lap_of(call.thread, native))
+                entity.times.cpu_ns += call_meter.lap_of(call.thread, native)
 
     def reports(
         self,
         period_sec: float,
         overdue: Iterable[tuple[str, RunningCall]],
         now_ns: int,
-        sampled_ns: int | None = None,
+        *,
+        is_measured: bool = False,
     ) -> dict[EntityKey, EntityReport]:
         """Return the health of all entities in the period that ends, and begin a new one.
 
@@ -284,13 +271,13 @@ class HealthRegistry:
             period_sec: How long the period was.
             overdue: The calls that exceed `warn_after`, with the full names of their nodes.
             now_ns: The present time of `time.monotonic_ns`.
-            sampled_ns: See `EntityReport`.
+            is_measured: See `EntityReport`.
         """
         longest: dict[EntityKey, float] = {}
         for node, call in overdue:
             key = node, call.owner
             longest[key] = max(longest.get(key, 0.0), (now_ns - call.since_ns) / 1e9)
         return {
-            key: entity.report(period_sec, longest.get(key, 0.0), sampled_ns)
+            key: entity.report(period_sec, longest.get(key, 0.0), is_measured=is_measured)
             for key, entity in self._entities.copy().items()
         }

@@ -30,7 +30,6 @@ ENTITY = {
     'key': '',
     'queued': 0,
     'cpu': None,
-    'gil': 0.5,
     'worker': '',
     'mean_ms': 1.0,
     'p99_ms': 1.0,
@@ -48,7 +47,6 @@ PROCESS = {
     'pid': 1,
     'cores': 2,
     'cpu': 0.5,
-    'gil': None,
     'gil_wait_mean_ms': 0.1,
     'gil_wait_max_ms': 0.2,
 }

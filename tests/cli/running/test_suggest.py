@@ -62,7 +62,6 @@ class Entity(NamedTuple):
 
     task: str
     cpu: object
-    gil: object
     rate: float
     lost: int = 0
 
@@ -76,7 +75,7 @@ def diagnostics(*entities, system='system', second=0, **values):
 
     statuses = [status('/_composer_system: system', {'cores': 4, **values})]
     for each in entities:
-        figures = {'cpu (%)': each.cpu, 'GIL (%)': each.gil, 'rate (Hz)': each.rate}
+        figures = {'cpu (%)': each.cpu, 'rate (Hz)': each.rate}
         statuses.append(status(each.task, {**figures, 'queue overruns': each.lost * second}))
     message = DiagnosticArray(status=statuses)
     message.header.stamp.sec = second
@@ -99,9 +98,9 @@ def system(tmp_path, monkeypatch):
 
 
 BUSY = (
-    Entity('/camera: timer shoot', 45, 45, 10),
-    Entity('/detect: subscription image', 50, 50, 10, lost=20),
-    Entity('/cam_left: timer look', 3, 2, 1),
+    Entity('/camera: timer shoot', 45, 10),
+    Entity('/detect: subscription image', 50, 10, lost=20),
+    Entity('/cam_left: timer look', 3, 1),
 )
 
 
@@ -125,7 +124,7 @@ def test_a_recording_says_what_to_split(system, capsys, tmp_path):
     out = capsys.readouterr()[0]
     assert out == (
         'system: 1.0 of 4 cores used → 1.8, expected 1.8x\n'
-        '  the process of the system: /camera 45%, /cam_left 2%, 1 without figures\n'
+        '  the process of the system: /camera 45%, /cam_left 3%, 1 without figures\n'
         '  worker detect: /detect 50%\n'
         '  messages between them: 4% of a core\n'
         '\n'
@@ -148,20 +147,8 @@ def test_the_cores_are_those_of_where_it_was_recorded(system, capsys, tmp_path):
     assert document['layer'] == {'nodes': {'detect': {'worker': 'detect'}}}
 
 
-def test_cpu_stands_for_a_gil_that_is_not_known(system, capsys, tmp_path):
-    idle = Entity('/cam_right: timer look', 0, 0, 1)
-    recording = record(tmp_path, BUSY[0], BUSY[1]._replace(gil=''), idle)
-    assert run(['suggest', str(system), '--recording', str(recording)]) == 0
-    assert capsys.readouterr()[0].startswith(
-        'system: 0.9 of 4 cores used → 1.8, expected 1.8x\n'
-        '  the process of the system: /detect 50%, 1 that did nothing, 1 without figures\n'
-        '  worker camera: /camera 45%\n'
-        '  the GIL of these is not known, and taken to be their CPU: /detect\n'
-    )
-
-
 def test_what_is_dropped_and_late_is_what_there_is_to_do(system, capsys, tmp_path):
-    late, dropping = Entity('/camera: timer shoot', 45, 45, 15), BUSY[1]
+    late, dropping = Entity('/camera: timer shoot', 45, 15), BUSY[1]
     for entities, demand in (([late], 2.0), ([late, dropping], 1.0 + 20 * 2 / 3 / 10)):
         recording = record(tmp_path, *entities)
         words = ['--recording', str(recording), '--format', 'json']
@@ -170,7 +157,7 @@ def test_what_is_dropped_and_late_is_what_there_is_to_do(system, capsys, tmp_pat
 
 
 def test_nodes_that_a_layer_cannot_move_stay(system, capsys, tmp_path):
-    busy = [Entity(f'/cam_{each}: timer look', 48, 48, 0.5) for each in ('left', 'right')]
+    busy = [Entity(f'/cam_{each}: timer look', 48, 0.5) for each in ('left', 'right')]
     recording = record(tmp_path, *busy)
     assert run(['suggest', str(system), '--recording', str(recording), '--format', 'json']) == 0
     assert json.loads(capsys.readouterr()[0])['layer'] == {'nodes': {}}
@@ -216,15 +203,14 @@ ERRORS = {
         "error: '{path}' says nothing about system 'system'\n  help: it is about: robot\n",
     ),
     'other nodes': (
-        lambda path: record(path, Entity('/else: timer x', 1, 1, 1)),
+        lambda path: record(path, Entity('/else: timer x', 1, 1)),
         "error: nothing was measured of the nodes of system 'system'\n"
         '  help: name the file that it ran with\n',
     ),
     'not measured': (
-        lambda path: record(path, Entity('/detect: subscription image', '', '', 1)),
+        lambda path: record(path, Entity('/detect: subscription image', '', 1)),
         "error: '{path}' does not say what the calls of 'system' cost\n"
-        '  help: its interpreter could not be watched, or an older Composer recorded it: '
-        'GIL (%) and cpu (%) are missing\n',
+        "  help: the figures 'cpu (%)' are missing\n",
     ),
 }
 
