@@ -344,6 +344,11 @@ class ExitActionSpec:
     start: str | None
     path: DataPath
 
+    @property
+    def ends_system(self) -> bool:
+        """Whether the system stops."""
+        return self.behaviour is None and self.start is None
+
 
 @record
 class DeclaredEndSpec:

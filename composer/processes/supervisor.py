@@ -292,16 +292,16 @@ class ProcessSupervisor:
         process.is_done = True
         if not process.spec.on_exit:
             self._has_started.wait(_LONGEST_START_SEC if code != 0 else None)
+        if any(each.ends_system for each in process.spec.on_exit):
+            end += ', so the system ends'
         self._log(end, is_error=code != 0)
         self.on_exit(process, code)
         process.is_acting = False
         self._end_if_last()
 
-    def end_system(self, process: ExternalProcess, code: int) -> None:
+    def end_system(self, code: int) -> None:
         """End the system, because a process has ended."""
         self._has_started.wait(_LONGEST_START_SEC)
-        text = f"{self._noun} '{process.spec.name}' has ended: the system ends"
-        self._log(text, is_error=code != 0)
         self._end_system(ExitCode.DONE if code == 0 else ExitCode.FAILED)
 
     def _end_if_last(self) -> None:

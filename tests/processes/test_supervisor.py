@@ -444,7 +444,9 @@ def test_the_end_of_a_process_may_end_the_system(compose, end, code):
     child = compose(system(processes))
 
     assert child.wait() == code
-    child.wait_for_line("process 'mission' has ended: the system ends")
+    how = f'has ended with exit code {code}' if code == 0 else 'was ended by SIGKILL'
+    child.wait_for_line(f"process 'mission' {how}, so the system ends")
+    assert len(child.matching("process 'mission'")) == 1
     child.wait_for_line("process 'other' was ended by SIGINT")
 
 
@@ -459,7 +461,7 @@ def test_a_process_that_keeps_dying_is_started_again_ever_more_slowly(compose):
         f'{end}; it is started again in 0.1 s',
         f'{end}; it is started again in 0.2 s',
         f'{end}; it is started again in 0.4 s',
-        f'{end}, and was started again 3 times already',
+        f'{end}, and was started again 3 times already, so the system ends',
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from contextlib import contextmanager
@@ -42,8 +43,11 @@ _RUNS_ON = 'the system runs on as it was'
 _STOPS = 'the system stops'
 # How often files are looked at while something is waited for.
 _LOOK_SEC = 0.2
+# Editors may write a file more than once for one save, of which one line is enough.
+_SAVE_SEC = 2.0
 _NO_CHANGE = 'nothing has changed'
 _GOOD_AGAIN = 'the files have no errors any more, and nothing has changed'
+_READ_AGAIN = 'the files were read again, and nothing has changed'
 
 
 class Reloader:
@@ -117,11 +121,13 @@ class Reloader:
 
         was_good = not self._told.failure
         self._told.show(findings)
-        text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}' if plan else _NO_CHANGE
+        text = _NO_CHANGE if was_good else _GOOD_AGAIN
+        if plan:
+            text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}'
         if system.starts_again:
             text = f'{STARTS_AGAIN}: {plan.summarize()}'
         if plan or not was_good:
-            system_logger.info(text if plan else _GOOD_AGAIN)
+            system_logger.info(text)
         system.state.note_reload(Outcome(succeeded=True, text=text))
         return Outcome(succeeded=True, text=with_findings(findings, text))
 
@@ -294,11 +300,19 @@ class Reloader:
         from composer.runtime.behaviours.tracebacks import format_internal_error
         from composer.runtime.logs import system_logger
 
+        told_sec = -math.inf
         for _ in self._files.edits(ended, system_logger.warning):
+            # Other files of their folders may be written at any time.
+            is_save = bool(self._files.list_changed()) and monotonic() > told_sec + _SAVE_SEC
             try:
                 self._reload(system, lambda: self._files.are_still(ended))
             except Exception as error:  # noqa: BLE001 - the next edit may be fine
                 system_logger.error(f'not reloaded:\n{format_internal_error(error)}')
+            else:
+                last = system.state.last_reload
+                if is_save and last is not None and last.outcome.text == _NO_CHANGE:
+                    system_logger.info(_READ_AGAIN)
+            told_sec = monotonic()
 
 
 class _HalfWrittenError(Exception):

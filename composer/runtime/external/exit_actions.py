@@ -83,7 +83,7 @@ class ExitActions:
             elif action.start is not None:
                 self._start(action.start)
             else:
-                self._processes.end_system(process, code)
+                self._processes.end_system(code)
 
     def report_hanging(self) -> bool:
         """Log the behaviours that have not ended; return whether all have."""

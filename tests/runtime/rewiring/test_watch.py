@@ -195,6 +195,20 @@ def test_what_was_told_is_not_told_again(running):
     assert [len(child.matching(each)) for each in told] == [1, 2, 1]
 
 
+def test_a_save_that_changes_nothing_says_so_once(running):
+    said = 'the files were read again, and nothing has changed'
+    path = running.folder / 'system.yaml'
+    (running.folder / 'other.yaml').write_text('no part of the system')
+    path.write_text(path.read_text())
+    running.child.wait_for_line(said)
+    # An edit that is due at once is no save of its own.
+    path.write_text(path.read_text())
+    path.write_text(path.read_text())
+    running.edit('{step: 1}', '{step: 2}')
+    running.reloaded()
+    assert len(running.child.matching(said)) == 1
+
+
 def test_modules_are_executed_anew_wherever_they_are_imported(running):
     """The package that has a module is as before; it must not keep the old one."""
     package = running.folder / 'inner'
