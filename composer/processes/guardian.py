@@ -6,7 +6,7 @@ behaviour that holds the interpreter nor an output that nobody reads can block i
 - Composer sends it a byte for each signal, from the handler that Python has in C, which runs
   whatever holds the interpreter, and a byte for what Composer does itself (`BEGUN` ...).
 - If a stop takes longer than it may, or more signals come and nothing happens, the guardian has
-  Composer print its stacks and end with exit code 1.
+  Composer print its stacks, and kills it.
 - Composer sends it a byte about once a second, too. When none has come for some time, the guardian
   reports that, with the stacks. It also reports that a behaviour has closed the pipe.
 - When Composer has ended, however that happened, it kills all processes that bear its mark:
@@ -43,9 +43,8 @@ _LOOK_SEC = 1.0
 _SILENT_LOOKS = 5
 # How long a process that ends may take from its last descriptor to its end.
 _CLOSING_SEC = 0.5
-# How long the threads of Composer get to print their stacks, and the process to end.
+# How long the threads of Composer get to print their stacks.
 _STACKS_SEC = 0.3
-_END_SEC = 2.0
 _KILL_SEC = 5.0
 _POLL_SEC = 0.01
 _CHUNK = 4096
@@ -61,17 +60,13 @@ class Guardian:
     Args:
         composer: A descriptor of the process.
         reports: Where the bytes come from.
-        switch: A byte that is written there ends Composer.
         stop_sec: How long a stop may take.
         exit_sec: How long Python may take to exit after it.
     """
 
-    def __init__(
-        self, composer: int, reports: int, switch: int, stop_sec: float, exit_sec: float
-    ) -> None:
+    def __init__(self, composer: int, reports: int, stop_sec: float, exit_sec: float) -> None:
         self._ended = composer
         self._reports = reports
-        self._switch = switch
         self._stop_sec = stop_sec
         self._exit_sec = exit_sec
         self._deadline = _NEVER
@@ -173,14 +168,11 @@ class Guardian:
 
     def _end_composer(self) -> None:
         tell(
-            '[FATAL] [composer]: the system did not end in time, and is ended; its threads are at'
+            '[FATAL] [composer]: the system did not end in time, and is killed; its threads are at'
         )
         self._signal(STACKS_SIGNAL)
         self._wait(_STACKS_SEC)
-        with contextlib.suppress(OSError):
-            os.write(self._switch, b'\0')
-        if not self._wait(_END_SEC):
-            self._signal(signal.SIGKILL)
+        self._signal(signal.SIGKILL)
 
     def _signal(self, number: int) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -250,8 +242,8 @@ def kill_marked(mark: int, whose: str = 'the system') -> None:
 
 def main() -> None:
     """Guard; the arguments: ID of Composer, those of `Guardian`, and the mark, 0 for none."""
-    composer, reports, switch = (int(each) for each in sys.argv[1:4])
-    stop_sec, exit_sec, mark = float(sys.argv[4]), float(sys.argv[5]), int(sys.argv[6])
+    composer, reports = (int(each) for each in sys.argv[1:3])
+    stop_sec, exit_sec, mark = float(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     try:
@@ -261,7 +253,7 @@ def main() -> None:
     # No child of Composer, or a behaviour that waits for all of its own would wait for ever.
     if os.fork():
         os._exit(0)
-    if Guardian(ended, reports, switch, stop_sec, exit_sec).run() and mark:
+    if Guardian(ended, reports, stop_sec, exit_sec).run() and mark:
         kill_marked(mark)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import faulthandler
 import os
@@ -21,7 +20,6 @@ from composer.processes import guardian
 if TYPE_CHECKING:
     from composer.terminal import EscapingLogger
 
-_SIGEV_THREAD = 2
 _MARK_BYTES = 7
 _POLL_SEC = 0.02
 _BEAT_SEC = 1.0
@@ -49,18 +47,17 @@ class GuardianClient:
         reports, self.descriptor = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._inode = os.fstat(self.descriptor).st_ino
         self._beat = 0.0
-        switch = _create_switch()
         print_stacks_at_signal()
         mark = _create_mark() if owns_process else 0
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own script
                 [
                     *(sys.executable, '-I', '-S', guardian.__file__),
-                    *map(str, (os.getpid(), reports, switch, stop_sec, exit_sec, mark)),
+                    *map(str, (os.getpid(), reports, stop_sec, exit_sec, mark)),
                 ],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                pass_fds=(reports, switch),
+                pass_fds=(reports,),
                 start_new_session=True,
             )
         finally:
@@ -195,61 +192,12 @@ def end_marked(mark: int, timeout_sec: float, logger: EscapingLogger) -> bool:
     return True
 
 
-class _SigEvent(ctypes.Structure):
-    """`struct sigevent` of glibc and musl on 64-bit Linux."""
-
-    _fields_ = (
-        ('value', ctypes.c_size_t),
-        ('signo', ctypes.c_int),
-        ('notify', ctypes.c_int),
-        ('function', ctypes.c_void_p),
-        ('attributes', ctypes.c_void_p),
-        ('padding', ctypes.c_ubyte * 32),
-    )
-
-
-class _AioControlBlock(ctypes.Structure):
-    """The beginning of their `struct aiocb`, with room for the rest."""
-
-    _fields_ = (
-        ('fildes', ctypes.c_int),
-        ('lio_opcode', ctypes.c_int),
-        ('reqprio', ctypes.c_int),
-        ('buf', ctypes.c_void_p),
-        ('nbytes', ctypes.c_size_t),
-        ('sigevent', _SigEvent),
-        ('rest', ctypes.c_ubyte * 256),
-    )
-
-
-@cache
-def _create_switch() -> int:
-    """Return a descriptor; a byte that is written there ends this process with exit code 1.
-
-    No Python runs for it: the C library reads the byte in a thread of its own, and calls `_exit`.
-    """
-    reader, switch = os.pipe2(os.O_CLOEXEC)
-    libc = ctypes.CDLL(None)
-    if hasattr(libc, 'aio_read'):
-        libc.calloc.restype = ctypes.c_void_p
-        # Never freed: the thread lives as long as the process.
-        address = libc.calloc(1, ctypes.sizeof(_AioControlBlock))
-        block = _AioControlBlock.from_address(address)
-        block.fildes = reader
-        block.buf = address + _AioControlBlock.rest.offset + block.rest._length_ - 1
-        block.nbytes = 1
-        block.sigevent.value = 1
-        block.sigevent.notify = _SIGEV_THREAD
-        block.sigevent.function = ctypes.cast(libc._exit, ctypes.c_void_p).value  # noqa: SLF001
-        libc.aio_read(ctypes.byref(block))
-    return switch
-
-
 @cache
 def print_stacks_at_signal() -> None:
     """Let the guardian's signal, and crashes, print the stacks of all threads."""
-    # When Python exits, it restores what was before its own handler.
-    ctypes.CDLL(None).signal(int(guardian.STACKS_SIGNAL), ctypes.c_void_p(signal.SIG_IGN))
+    # When Python exits, it restores what was before its own handler. Only the main thread may.
+    with suppress(ValueError):
+        signal.signal(guardian.STACKS_SIGNAL, signal.SIG_IGN)
     with suppress(AttributeError, RuntimeError, ValueError):
         # There may be no standard error.
         stderr: Any = sys.__stderr__

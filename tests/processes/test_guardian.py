@@ -109,7 +109,7 @@ def test_a_process_that_was_told_to_end_has_not_crashed(capfd):
     reports, descriptor = os.pipe()
     os.write(descriptor, bytes([signal.SIGINT]))
 
-    assert guardian.Guardian(ended, reports, descriptor, 10.0, 10.0).run()
+    assert guardian.Guardian(ended, reports, 10.0, 10.0).run()
     assert capfd.readouterr().err == ''
     for each in (ended, reports, descriptor):
         os.close(each)
@@ -119,7 +119,7 @@ def test_a_stop_may_take_as_long_as_was_told_last(capfd):
     """The bytes of the time mean nothing else, and may come in two pieces."""
     with subprocess.Popen(['sleep', '1000']) as process:
         reports, descriptor = os.pipe()
-        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, descriptor, 1000.0, 10.0)
+        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, 1000.0, 10.0)
         told = bytes([guardian.LIMIT]) + guardian.SECONDS.pack(0.01)
         watching._take_all(told[:4])
         os.write(descriptor, told[4:] + bytes([guardian.BEGUN]))
@@ -141,7 +141,7 @@ def test_silence_is_reported_unless_the_process_is_stopped(capfd, monkeypatch, w
         wait_for(lambda: read_state(Path(f'/proc/{process.pid}')) == b'T', 'its stop')
         reports, descriptor = os.pipe()
         os.write(descriptor, bytes([guardian.BEAT]))
-        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, descriptor, 1.0, 1.0)
+        watching = guardian.Guardian(os.pidfd_open(process.pid), reports, 1.0, 1.0)
         thread = threading.Thread(target=watching.run)
         thread.start()
         wait_for(lambda: len(looks) > 2 * guardian._SILENT_LOOKS, 'looks at it')
@@ -167,7 +167,7 @@ def test_a_call_that_holds_the_interpreter_is_reported(compose):
 def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
     with subprocess.Popen(['true']) as process:
         pass
-    monkeypatch.setattr('sys.argv', ['guardian', str(process.pid), '0', '0', '1', '1', '0'])
+    monkeypatch.setattr('sys.argv', ['guardian', str(process.pid), '0', '1', '1', '0'])
     monkeypatch.setattr(signal, 'signal', lambda *_: None)
 
     guardian.main()
@@ -175,13 +175,13 @@ def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
 
 
 @pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGHUP'], ['SIGINT', 'SIGINT']])
-def test_a_call_that_holds_the_interpreter_is_ended(compose, signals):
+def test_a_process_that_holds_the_interpreter_is_killed(compose, signals):
     child = compose(HOLDING, CODE)
     child.wait_for_line('holding')
     for name in signals:
         child.send(signal.Signals[name])
 
-    assert child.wait() == 1
+    assert child.wait() == -signal.SIGKILL
     assert child.matching('the system did not end in time')
     assert child.matching('in hold_interpreter')
 
@@ -198,7 +198,7 @@ def test_output_that_blocks_does_not_keep_the_process_alive(compose, start_progr
     wait_for(lambda: 'pipe_write' in stack_of(process.pid), 'a full pipe')
     process.send_signal(signal.SIGINT)
 
-    assert process.wait(DEADLINE_SEC) == 1
+    assert process.wait(DEADLINE_SEC) == -signal.SIGKILL
 
 
 def stack_of(pid):

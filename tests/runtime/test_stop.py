@@ -1,5 +1,7 @@
 """Suspended behaviours end at a stop and before a restart, and every stop comes to its end."""
 
+import signal
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -150,7 +152,7 @@ stop._MARGIN_SEC = 0.5
     child = compose(text, CODE + hurry)
     child.wait_until_ready()
 
-    assert child.stop() == 1
+    assert child.stop() == -signal.SIGKILL
     assert child.matching('in hold_interpreter')
 
 
