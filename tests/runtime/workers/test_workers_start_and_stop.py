@@ -8,7 +8,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run
-from tests.running import descendants
+from composer.language.pipeline import load_system_text
+from composer.processes.worker_supervisor import WorkerSupervisor
+from composer.runtime.workers.worker import Worker
+from tests.running import DEADLINE_SEC, descendants
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
@@ -204,3 +207,25 @@ def test_what_was_started_for_a_system_that_cannot_start_ends(
     assert run(['up', 'a.yaml']) == 1
     assert problem in ''.join(capsys.readouterr())
     wait_until_gone({*descendants(os.getpid())} - {*before})
+
+
+def test_a_worker_stays_until_the_answer_to_its_stop_has_come(monkeypatch):
+    """If it ended by itself, the answer could be lost: a clean stop would count as a failure."""
+    spec = load_system_text(system({'far': node('left')})).spec.workers['left']
+    supervisor = WorkerSupervisor(None, pytest.fail, DEADLINE_SEC)
+    worker = Worker(spec, supervisor, {}, frozenset)
+    worker.spawn()
+    worker.call('ping')
+    worker.has_imported = True
+    tell = worker.channel.tell
+
+    def tell_late(name):
+        for _ in range(1000):
+            worker.call('ping')
+        tell(name)
+
+    monkeypatch.setattr(worker.channel, 'tell', tell_late)
+    assert worker.stop(DEADLINE_SEC) == (0, True)
+    assert worker.process.run.gone.wait(DEADLINE_SEC)
+    assert worker.process.run.code == 0
+    assert supervisor.stop()
