@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -43,9 +43,17 @@ def escape_lines(text: str) -> str:
 
     So no text that is quoted in it can begin a line, which would look like an entry of its own.
     """
-    first, *others = text.split('\n')
-    lines = (f'{_INDENT}{escape(line)}' if line else '' for line in others)
-    return '\n'.join([escape(first), *lines])
+    return _indented(map(escape, text.split('\n')))
+
+
+def escape_log(text: str) -> str:
+    """Return a text as `escape_lines` does, in which tabs and colours (SGR) stay."""
+    return text if text.isprintable() else _indented(map(_escape_coloured, text.split('\n')))
+
+
+def _indented(lines: Iterable[str]) -> str:
+    first, *others = lines
+    return '\n'.join([first, *(f'{_INDENT}{line}' if line else '' for line in others)])
 
 
 def escape_output(text: str) -> str:

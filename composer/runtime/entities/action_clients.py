@@ -24,7 +24,6 @@ from composer.runtime.entities.local_goals import GoalClient
 from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import Goal
-from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
@@ -45,7 +44,7 @@ class ActionClient:
         action_class: Any = import_interface(spec.type)
         self._node = node
         self._name = node.ros.resolve_action_name(spec.action)
-        self._logger = EscapingLogger(node.ros.get_logger())
+        self._logger = node.ros.get_logger()
         self._convert = converter_for(action_class.Goal).convert
         self._client = _Client(node.ros, action_class, spec.action)
         services = node.system.services

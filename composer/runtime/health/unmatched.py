@@ -18,7 +18,6 @@ from composer.language.qos_conflicts import CONFLICTS, describe_conflicts, find_
 from composer.runtime.health.qos_losses import QosLosses
 from composer.runtime.health.watcher import Watcher
 from composer.runtime.messages.qos_profiles import read_policies
-from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -71,7 +70,7 @@ class TopicEndpoint:
         self.losses = QosLosses(
             self.describe,
             self._declared,
-            EscapingLogger(ros.get_logger()).warning,
+            ros.get_logger().warning,
             publishes=self._publishes,
         )
 
@@ -155,7 +154,7 @@ class TopicEndpoint:
     def _report(self, name: str, reason: str) -> None:
         what = 'sends nothing to' if self._publishes else 'gets nothing from'
         text = f"{self.describe()} {what} '{name}': {reason}"
-        EscapingLogger(self.ros.get_logger()).warning(text)
+        self.ros.get_logger().warning(text)
 
     def _find_reason(self, end: TopicEndpointInfo, here: Mapping[str, Any]) -> str | None:
         """Return why another end cannot match this one, `None` if it can."""

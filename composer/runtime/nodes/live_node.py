@@ -41,7 +41,6 @@ from composer.runtime.nodes.qos_overrides import QosOverrides
 from composer.runtime.nodes.remote_parameters import RemoteParameters
 from composer.runtime.nodes.ros_node import ComposedRosNode
 from composer.runtime.reserved_methods import release, reserve
-from composer.terminal import EscapingLogger
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -408,7 +407,7 @@ class LiveNode:
         return self.system.health.entity(self.full_name, owner)
 
     def _limit(self, owner: Owner, path: DataPath, options: BehaviourOptions) -> None:
-        warn = EscapingLogger(self.ros.get_logger()).warning
+        warn = self.ros.get_logger().warning
         place = partial(self.place, path)
         self.limits[owner] = HangLimit(owner, place, options.warn_after_sec, warn)
 
@@ -441,7 +440,7 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
         system,
         ros,
         behaviour_node=Node(ros, state, entities, remote_parameters, system.shutdown, creation),
-        errors=ErrorReporter(EscapingLogger(ros.get_logger()).error),
+        errors=ErrorReporter(ros.get_logger().error),
         entities=entities,
         waits=waits,
         background=background,

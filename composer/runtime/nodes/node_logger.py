@@ -1,4 +1,4 @@
-"""The logger of a node: rclpy's, for which the calls of one line of code may differ."""
+"""The logger of a node: rclpy's, for any text, and for calls that differ in one line of code."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from rclpy.impl import rcutils_logger
 from rclpy.impl.rcutils_logger import RcutilsLogger
+
+from composer.terminal import escape_log
 
 if TYPE_CHECKING:
     from rclpy.impl.logging_severity import LoggingSeverity
@@ -19,7 +21,8 @@ class NodeLogger(RcutilsLogger):
 
     rclpy keeps what a line has logged first, and refuses another level or other options from it:
     `log = logger.info if ok else logger.warning`. So each level with its options has a logger of
-    rclpy's.
+    rclpy's. What a behaviour logs may be what others have sent: it can forge no line, and no
+    terminal obeys more of it than its colours.
     """
 
     def __init__(self, name: str) -> None:
@@ -32,7 +35,8 @@ class NodeLogger(RcutilsLogger):
         logger = self._alike.get(key)
         if logger is None:
             logger = self._alike.setdefault(key, RcutilsLogger(self.name))
-        return bool(logger.log(message, severity, **options))
+        text = escape_log(message) if isinstance(message, str) else message
+        return bool(logger.log(text, severity, **options))
 
     def get_child(self, name: str) -> NodeLogger:
         """See the base class."""

@@ -51,3 +51,25 @@ def test_levels_and_options_may_change_from_call_to_call(compose):
             lines = child.matching(f'with [{option}] {number}')
             assert len(lines) == (number in heard), child.output
     assert child.stop() == 0
+
+
+HOSTILE = """\
+from composer import Node
+
+TEXT = 'a\\x1b[31mred\\x1b]52;c;eA==\\x07\\x9b2J\\u202e\\ud800\\n[ERROR] [1.0] [other]: forged\\n\\tb\\r\\n\\nc'
+
+
+def begin(node: Node) -> None:
+    for logger in (node.logger, node.ros.get_logger(), node.logger.get_child('part')):
+        logger.error(TEXT)
+"""
+
+
+def test_a_text_forges_no_line_and_of_it_a_terminal_obeys_colours_only(compose):
+    child = compose(SYSTEM, HOSTILE)
+    child.wait_until_ready()
+    shown = 'a\x1b[31mred\\x1b]52;c;eA==\\x07\\x9b2J\\u202e\\ud800\x1b[0m'
+    rest = '\n  [ERROR] [1.0] [other]: forged\n  \tb\\r\n\n  c\n'
+    for name in ('talker', 'talker.part'):
+        assert f'[{name}]: {shown}{rest}' in child.output
+    assert child.stop() == 0
