@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from composer.executor.after_fork import end_child, flush_output
-
-if TYPE_CHECKING:
-    from types import CodeType, FrameType
+from composer.executor.after_fork import flush_output
 
 # Whether this process is such a child.
 in_child = False
@@ -26,9 +22,6 @@ signal_handlers: dict[int, Any] = {}
 
 # The signal mask of the thread that forks.
 _fork = threading.local()
-
-# The code of coroutines that run behaviours.
-coroutine_codes: set[CodeType] = set()
 
 
 def _prepare() -> None:
@@ -53,11 +46,6 @@ def _start_child() -> None:
             signal.signal(number, handler)
     _restore_mask()
     _become_main_thread()
-    frame: FrameType | None = sys._getframe()  # noqa: SLF001 - the only way
-    while frame is not None and frame.f_code not in coroutine_codes:
-        frame = frame.f_back
-    if frame is not None:
-        _end_with(frame)
 
 
 def _become_main_thread() -> None:
@@ -69,16 +57,6 @@ def _become_main_thread() -> None:
     thread: Any = threading.main_thread()
     if getattr(thread, '_tstate_lock', thread) is None:
         thread._set_tstate_lock()  # noqa: SLF001 - as Python itself does since
-
-
-def _end_with(coroutine: FrameType) -> None:
-    """End the child when a coroutine returns or awaits."""
-
-    def profile(frame: FrameType, event: str, _argument: object) -> None:
-        if event == 'return' and frame is coroutine:
-            end_child()
-
-    sys.setprofile(profile)
 
 
 os.register_at_fork(before=_prepare, after_in_parent=_restore_mask, after_in_child=_start_child)

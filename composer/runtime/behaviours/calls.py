@@ -169,8 +169,6 @@ class BehaviourCall:
                 if token is not None:
                     running.end(token)
 
-        # A child goes on in the executor whenever its coroutine waits.
-        forked_children.coroutine_codes.add(await_behaviour.__code__)
         return await_behaviour
 
 
