@@ -203,7 +203,6 @@ class Reloader:
             reading = import_with_patience(
                 import_all,
                 lambda: system.stop_requested or self._is_outdated(),
-                snapshot.sources,
             )
             if reading is None:
                 raise ComposerError(_RUNS_ON)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-import importlib
 import threading
 from time import monotonic
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from composer.errors import ComposerError
 from composer.runtime.behaviours.callables import ImportAbandonedError
@@ -14,7 +13,7 @@ from composer.runtime.behaviours.stacks import format_thread
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
 _T = TypeVar('_T')
 _POLL_SEC = 0.05
@@ -22,17 +21,12 @@ _WARN_AFTER_SEC = 5.0
 _INTERRUPT_SEC = 0.5
 
 
-def import_with_patience(
-    function: Callable[[], _T], gives_up: Callable[[], bool], modules: Iterable[str]
-) -> _T:
+def import_with_patience(function: Callable[[], _T], gives_up: Callable[[], bool]) -> _T:
     """Call a function that imports modules, for as long as nobody gives up; say if it takes long.
 
-    Args:
-        modules: The names of those that can be imported anew if it never ends.
-
     Raises:
-        ComposerError: It was given up. A module that loops was interrupted; one that waits goes
-            on waiting, in its thread.
+        ComposerError: It was given up. A module that loops was interrupted; one that waits in C
+            goes on waiting in its thread, and cannot be imported again until it ends.
     """
     results: list[_T] = []
     failures: list[BaseException] = []
@@ -49,7 +43,7 @@ def import_with_patience(
     while thread.is_alive():
         thread.join(_POLL_SEC)
         if thread.is_alive() and gives_up():
-            _leave(thread, modules)
+            _leave(thread)
             message = 'an import of behaviours was given up'
             raise ComposerError(message)
         if monotonic() - begun > _WARN_AFTER_SEC and not was_told:
@@ -61,16 +55,13 @@ def import_with_patience(
     return results[0]
 
 
-def _leave(thread: threading.Thread, modules: Iterable[str]) -> None:
-    """End a thread if it executes Python code; else let it be, without the locks of modules."""
+def _leave(thread: threading.Thread) -> None:
+    """End a thread if it executes Python code; else leave it."""
     _raise_in(thread, ImportAbandonedError)
     thread.join(_INTERRUPT_SEC)
     if thread.is_alive():
         # Raised much later, it would remove the module of the same name from those imported.
         _raise_in(thread, None)
-        locks: dict[str, Any] = vars(importlib)['_bootstrap']._module_locks  # noqa: SLF001 - the only way
-        for name in modules:
-            locks.pop(name, None)
 
 
 def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:
