@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 import types
 from collections import abc
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.inference.behaviour_results import check_results
 from composer.inference.current_run import Run, TooLongError
-from composer.inference.evaluation.evaluator import Evaluator
+from composer.inference.evaluation.evaluator import Evaluator, lasting
 from composer.inference.message_types import MessageTypes
 from composer.inference.module_names import ProjectModules, is_of_project
 from composer.inference.node_facts import NodeFacts, Question
@@ -18,6 +19,7 @@ from composer.inference.unread_code import Mentions, find_mentions
 from composer.inference.values import (
     BY_FILE,
     BY_RUN,
+    BY_STATE,
     CHOSEN,
     NODE,
     NONE,
@@ -32,9 +34,11 @@ from composer.inference.values import (
     Partial,
     PartOfNode,
     Place,
+    Scalar,
     Sequence,
     Unknown,
     Value,
+    alternatives,
     constant,
     is_chosen,
     join,
@@ -123,12 +127,12 @@ class BehaviourReader:
                 each.is_own_state_open if is_own else each.is_state_open for each in readings
             )
             values = [each.kept[name] for each in readings if name in each.kept]
-            if not is_own:
-                values += [UNKNOWN] if node.state.get(name) is not None else []
-            value = UNKNOWN if is_open else join([*values, NONE])
+            first = constant(None if is_own else node.state.get(name))
+            value = UNKNOWN if is_open else join(_widest([*values, lasting(first)]))
+            is_moving = reader.needs_state and not is_open and _moves(name, keepers)
             if value not in (UNKNOWN, NONE) and not is_chosen(value):
-                found[name] = value
-            elif reader.needs_state and not is_open and _moves(name, keepers):
+                found[name] = join(_marked(each, is_moving) for each in alternatives(value))
+            elif is_moving:
                 found[name] = Unknown(BY_RUN)
         return found
 
@@ -191,6 +195,18 @@ class BehaviourReader:
         run.reading.settle()
         run.reading.kept_read = {name for topic, name in facts.log if topic == 'kept'}
         return run.reading
+
+
+def _widest(values: list[Value]) -> list[Value]:
+    """Return what may be kept: who keeps a float where a whole number was finds either."""
+    has_float = any(isinstance(each, Scalar) and each.kind is float for each in values)
+    return [each for each in values if not (has_float and each == Scalar(int))]
+
+
+def _marked(value: Value, is_moving: bool) -> Value:  # noqa: FBT001
+    """Return what is kept as something on which the state decides."""
+    chosen = BY_RUN if is_moving else BY_STATE
+    return replace(value, is_chosen=chosen) if isinstance(value, Scalar) else value
 
 
 def _moves(name: str, keepers: abc.Iterable[tuple[Binding, Reading]]) -> bool:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from composer.interfaces.descriptions import FieldType
 
 PARTS = ('Request', 'Response', 'Goal', 'Result', 'Feedback')
-_PYTHON_TYPES: dict[str, type] = {
+PYTHON_TYPES: dict[str, type] = {
     'bool': bool,
     'byte': bytes,
     'float32': float,
@@ -112,7 +112,7 @@ def value_of(field_type: FieldType, owner: Message) -> Value:
         return ArrayField(field_type, owner.is_made, owner.is_read_only)
     if owner.is_made:
         return UNKNOWN
-    return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
+    return Scalar(PYTHON_TYPES.get(field_type.kind, int))
 
 
 def item_of(array: ArrayField) -> Value:
@@ -121,6 +121,7 @@ def item_of(array: ArrayField) -> Value:
     if field_type.nested:
         return Message(field_type.nested, array.is_made, array.is_read_only)
     # NumPy's numbers come out of arrays of fixed length.
-    if field_type.array == 'fixed' and field_type.kind not in ('string', 'wstring'):
+    is_of_numpy = field_type.array == 'fixed' or array.is_made
+    if is_of_numpy and field_type.kind not in ('string', 'wstring'):
         return UNKNOWN
-    return Scalar(_PYTHON_TYPES.get(field_type.kind, int))
+    return Scalar(PYTHON_TYPES.get(field_type.kind, int))

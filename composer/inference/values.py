@@ -597,6 +597,11 @@ def once_set(value: Value) -> Value:
     return replace(value, unset='') if isinstance(value, Scalar) and value.unset else value
 
 
+def before_set(value: Value) -> Value:
+    """Return what a parameter is until something sets it."""
+    return Scalar(type(None)) if getattr(value, 'unset', '') else value
+
+
 def is_none(value: Value) -> bool:
     """Return whether a value is `None`, whoever decided on it."""
     return isinstance(value, Constant) and value.value is None

@@ -26,7 +26,7 @@ _ENUMERATIONS = {'enum.Enum', 'enum.IntEnum', 'enum.StrEnum', 'enum.Flag', 'enum
 _FLAGS = {'enum.Flag', 'enum.IntFlag'}
 # Those whose members are nothing else.
 _PLAIN = {'enum.Enum', 'enum.Flag', 'abc.ABC', 'builtins.object'}
-_CONVERSIONS = ('__index__', '__int__', '__float__', '__iter__', '__array__')
+_CONVERSIONS = ('__eq__', '__index__', '__int__', '__float__', '__iter__', '__array__')
 # Those whose members are texts and numbers themselves.
 _MIXINS = {'enum.StrEnum', 'enum.IntEnum', 'builtins.str', 'builtins.int', 'builtins.float'}
 

@@ -16,9 +16,10 @@ from composer.inference.values import (
     Value,
 )
 from composer.records import record
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Iterable
 
 
 @record
@@ -88,7 +89,7 @@ class MadeFields(Part):
         given = dict(zip(by_position, arguments.positional, strict=False))
         given |= dict(arguments.named)
         if not arguments.is_open:
-            self._check_missing(instance.of, fields, given)
+            self._check_given(instance.of, fields, given)
         for name, field in fields.items():
             if name in given:
                 instance.set(name, given[name].value)
@@ -100,23 +101,28 @@ class MadeFields(Part):
         values = [instance.attributes.get(name, UNKNOWN) for name in extra]
         self._evaluator.classes.call_method(instance, '__post_init__', *values)
 
-    def _check_missing(self, of: Class, fields: dict[str, _Field], given: Container[str]) -> None:
-        """Report fields without a default that a call leaves out."""
+    def _check_given(self, of: Class, fields: dict[str, _Field], given: Iterable[str]) -> None:
+        """Report fields without a default that a call leaves out, and those that there are not."""
         calls = self._evaluator.call_places
         bases = self._evaluator.classes.bodies.line_of(of)
         is_made = any(isinstance(each, ast.Call) for each in of.definition.decorator_list)
-        if not calls or is_made or not all(isinstance(each, Class | External) for each in bases):
+        if not calls or not all(isinstance(each, Class | External) for each in bases):
             return
+        text = f"'{of.definition.name}' is called with other arguments than it takes: "
+        others = [] if self.is_namespace(of) else [name for name in given if name not in fields]
+        if others:
+            text += f"got an unexpected keyword argument '{others[0]}'"
+            self._evaluator.run.report('bad-call', calls[-1], text, suggest(others[0], fields))
         missing = [
             name
             for name, field in fields.items()
             if field.kind in ('', 'InitVar')
+            and not is_made
             and field.default is None
             and name not in given
             and (self.is_tuple(of) or 'dataclasses.dataclass' in self._decorators(field.of))
         ]
         if missing:
-            text = f"'{of.definition.name}' is called with other arguments than it takes: "
             text += f"missing a required argument: '{missing[0]}'"
             self._evaluator.run.report('bad-call', calls[-1], text)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.inference.classes.project_classes import CLASS_NAMES
 from composer.inference.current_run import name_place
+from composer.inference.evaluation.containers import SAME
 from composer.inference.evaluation.library.known_functions import MAPPINGS
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.read_only_writes import VIEWING, WRITING
@@ -283,6 +284,8 @@ class Attributes(Part):
 
     def _read_array(self, owner: ArrayField, name: str) -> Value | tuple[str, str, str | None]:
         nested = owner.type.nested
+        if nested is None and owner.is_made and name not in SAME:
+            return UNKNOWN
         if nested is None or hasattr(list, name):
             return BoundMethod(owner, name)
         message = f"'{name}' is read of an array of {nested}"

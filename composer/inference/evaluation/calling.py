@@ -244,9 +244,6 @@ class Calls(Part):
             case External():
                 if is_awaited:
                     self._evaluator.waiting.await_asyncio(function.name, arguments, place)
-                made = self._evaluator.callables.call(function.name, arguments, place)
-                if made is not None:
-                    return made
                 return self._evaluator.library.call(function.name, arguments, place)
             case PartOfNode(name='parameters'):
                 # Those with a prefix.

@@ -28,6 +28,9 @@ from composer.inference.values import (
 )
 from composer.spelling import suggest
 
+# Methods of an array that give its items in another form.
+SAME = ('copy', 'flatten', 'ravel', 'reshape', 'tobytes')
+
 
 class Containers(Part):
     """Evaluates methods of dictionaries, lists, texts and parts of the node."""
@@ -48,6 +51,8 @@ class Containers(Part):
                 return owner
             case Mapping() | Sequence() | Constant() | Scalar() | Instance():
                 return self._evaluator.methods.call(owner, name, arguments, place)
+            case ArrayField(is_made=True, type=made) if name in SAME and not made.nested:
+                return Scalar(bytes) if name == 'tobytes' else owner
             case ArrayField() if name == 'copy':
                 return self._evaluator.read_only.copy_of(owner, place)
             case ArrayField() if name == 'tolist':

@@ -6,7 +6,6 @@ import ast
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
-from composer.inference.classes.made_callables import MadeCallables
 from composer.inference.classes.project_classes import Classes
 from composer.inference.evaluation.attributes import Attributes
 from composer.inference.evaluation.calling import Calls
@@ -18,6 +17,7 @@ from composer.inference.evaluation.library.known_values import refusal
 from composer.inference.evaluation.library.library_calls import LibraryCalls
 from composer.inference.evaluation.library.method_calls import MethodCalls
 from composer.inference.evaluation.node_calls import NodeCalls
+from composer.inference.evaluation.operators import explain_unset
 from composer.inference.evaluation.payload_fits import Payloads
 from composer.inference.evaluation.read_only_writes import ReadOnlyWrites
 from composer.inference.evaluation.sleeping import Sleeping
@@ -29,7 +29,6 @@ from composer.inference.statements.guards import Guards
 from composer.inference.statements.loop_rounds import Loops
 from composer.inference.statements.match_cases import MatchCases
 from composer.inference.statements.narrowing import Narrowing
-from composer.inference.statements.registries import Registries
 from composer.inference.statements.statement_flow import Statements
 from composer.inference.values import (
     BY_PARAMETER,
@@ -62,6 +61,7 @@ from composer.inference.values import (
     Unknown,
     Value,
     alternatives,
+    before_set,
     constant,
     held_by,
     is_chosen,
@@ -77,6 +77,10 @@ if TYPE_CHECKING:
 
     from composer.inference.current_run import Run
     from composer.python_source.modules import ModuleSource
+
+
+# What is kept in the state as a value of these, is one of them later.
+_LASTING = (bool, int, float, str, list)
 
 
 class Evaluator:
@@ -95,7 +99,6 @@ class Evaluator:
         self.guards = Guards(self)
         self.match_cases = MatchCases(self)
         self.narrowing = Narrowing(self)
-        self.registries = Registries(self)
         self.calls = Calls(self)
         self.node_calls = NodeCalls(self)
         self.containers = Containers(self)
@@ -103,7 +106,6 @@ class Evaluator:
         self.methods = MethodCalls(self)
         self.functions = Functions(self)
         self.classes = Classes(self)
-        self.callables = MadeCallables(self)
         self.imports = Imports(self)
         self.attributes = Attributes(self)
         self.payloads = Payloads(self)
@@ -134,6 +136,8 @@ class Evaluator:
                 value = current.latest(name) if current is not scope else None
                 if current.names is not None and name in current.names:
                     value = current.names[name]
+                if value is None and current is scope and not current.looped:
+                    self._refuse_unbound(name, current, Place(scope.module, node))
                 return UNKNOWN if value is None else value
             current = current.outer
         modules = self.run.modules
@@ -147,15 +151,18 @@ class Evaluator:
             self.run.probed.add(Held(str(scope.module.path), name))
         return self.top_value(scope.module, name)
 
+    def _refuse_unbound(self, name: str, scope: Scope, place: Place) -> None:
+        """Report a name of a function that no statement before a place has stored."""
+        if scope.names is not None and scope.function is not None and name not in scope.stored:
+            text = f"'{name}' has no value here: this function stores it later, or elsewhere"
+            self.run.report('undefined-name', place, text)
+
     def top_value(self, module: ModuleSource, name: str) -> Value:
         """Return what a name at the top of a module stands for."""
         self.run.reading.modules.setdefault(id(module), module)
         home = self.run.modules.star_home(module, name)
         if home is not None:
             return self.top_value(home, name)
-        registry = self.registries.find(module, name)
-        if registry is not None:
-            return registry
 
         def evaluate(statement: ast.AST, is_conditional: bool) -> Value:  # noqa: FBT001
             scope = Scope(module)
@@ -207,8 +214,11 @@ class Evaluator:
     ) -> None:
         """Report that Python refuses the types of what a function is called with."""
         problem = refusal(function, *arguments, **named)
+        unset = next(filter(None, (getattr(each, 'unset', '') for each in arguments)), '')
         if problem is not None:
             self.run.report('bad-call', place, problem)
+        elif unset and refusal(function, *map(before_set, arguments), **named):
+            self.run.report('no-value', place, *explain_unset(unset))
 
     def tested(self, node: ast.expr, scope: Scope) -> Value:
         """Return what a condition may be: a coroutine is always true."""
@@ -323,7 +333,7 @@ class Evaluator:
         kept = self.run.reading.kept
         if is_chosen(value) > BY_STATE or self.run.decided or not self.run.is_sure:
             self.run.reading.kept_by_file.add(name)
-        found = join(map(_lasting, alternatives(value)))
+        found = join(map(lasting, alternatives(value)))
         kept[name] = join([kept[name], found]) if name in kept else found
         if isinstance(value, Instance) and not value.is_member:
             share(value)
@@ -407,13 +417,15 @@ class Evaluator:
             self.run.reading.reads_others = True
 
 
-def _lasting(value: Value) -> Value:
+def lasting(value: Value) -> Value:
     """Return what of a value holds in other calls, too."""
     match value:
         case Message():
             return Message(value.type, is_made=True, is_read_only=value.is_read_only)
         case Constant(value=None):
             return NONE
+        case Constant(member=None) | Scalar(unset='') | Sequence() if value.kind in _LASTING:
+            return Scalar(value.kind)
         case PartOfNode(name='time' | 'goal'):
             return value
     return UNKNOWN

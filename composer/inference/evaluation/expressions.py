@@ -17,7 +17,6 @@ from composer.inference.evaluation.operators import (
     OPERATIONS,
     combine,
     compare,
-    explain_unset,
     is_never_equal,
     negate,
     refuses_time,
@@ -197,11 +196,7 @@ class Expressions(Part):
         self, sign: ast.operator | ast.cmpop, left: Value, right: Value, place: Place
     ) -> None:
         """Report values that an operator does not take."""
-        scalars = [each for each in (left, right) if isinstance(each, Scalar)]
-        unset = next((each.unset for each in scalars if each.unset), '')
-        if unset and type(sign) in OPERATIONS:
-            self._evaluator.run.report('no-value', place, *explain_unset(unset))
-        elif type(sign) in OPERATIONS:
+        if type(sign) in OPERATIONS:
             self._evaluator.refuse(place, OPERATIONS[type(sign)], left, right)
         if refuses_time(sign, left, right):
             text = 'a time of rclpy is combined only with durations and other times'

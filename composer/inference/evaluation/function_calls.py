@@ -28,6 +28,7 @@ from composer.inference.values import (
     Place,
     Sequence,
     Value,
+    constant,
     join,
 )
 from composer.python_source.changed_names import changed_in
@@ -232,7 +233,8 @@ class Functions(Part):
                 if scope.names is not None:
                     if run.doubts:
                         scope.doubtful.add(id(definition))
-                    scope.returned.append((NONE, Place(function.module, definition)))
+                    end = Place(function.module, definition)
+                    scope.returned.append((constant(None, end), end))
             for inner in scope.inner:
                 if not inner.is_read:
                     # Nobody seems to call it.

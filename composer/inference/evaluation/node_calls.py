@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
 from composer.inference.current_run import name_place, span_of
+from composer.inference.evaluation.library.known_values import Computation, NotKnownError
 from composer.inference.evaluation.part import Part
 from composer.inference.reading import (
     CREATING_METHODS,
@@ -42,10 +43,12 @@ from composer.inference.values import (
     is_none,
     join,
 )
+from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
     from collections import abc
 
+    from composer.entity_kinds import EntityKind
     from composer.inference.reading import Waited
 
 
@@ -125,6 +128,7 @@ class NodeCalls(Part):
         type_name = type_place = None
         if kind.channel and of_type is not None:
             type_name, type_place = _type_named(of_type.value), span_of(of_type.place)
+        self._check_options(kind, arguments)
         channel = arguments.get(1, 'topic') or arguments.get(1, 'srv_name')
         if kind.channel and channel is not None:
             run.decide(channel.value)
@@ -158,6 +162,21 @@ class NodeCalls(Part):
             if argument is not behaviour:
                 self._evaluator.escape(argument.value)
         return UNKNOWN
+
+    def _check_options(self, kind: EntityKind, arguments: Arguments) -> None:
+        """Check the keys that an entity is created with: they are those of the file."""
+        for name, argument in arguments.named:
+            if name in ('name', 'msg_type', 'srv_type', 'srv_name'):
+                continue
+            try:
+                value = Computation(argument.place).python(argument.value)
+            except NotKnownError:
+                value = None
+            entity = {**kind.stand_in, name: value}
+            problem = find_problem({'nodes': {'node': {kind.section: {'created': entity}}}})
+            if problem and (value is not None or problem.startswith('unknown key')):
+                text = problem.replace("'created'", f"'{kind.noun}'")
+                self._evaluator.run.report('bad-call', argument.place, text)
 
     def call_goal(self, owner: PartOfNode, method: str, place: Place, *, waits: bool) -> Value:
         """Return what a method of a goal may return."""

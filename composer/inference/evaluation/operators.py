@@ -6,6 +6,7 @@ import ast
 import operator
 import re
 from array import array
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,7 +58,19 @@ ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.RShift: operator.rshift,
 }
 _EPOCH = datetime.fromtimestamp(0, UTC)
-_SAMPLES: list[Any] = [True, 1, 1.0, '1', b'1', [], Path(), _EPOCH, _EPOCH.date(), timedelta(1)]
+_SAMPLES: list[Any] = [
+    None,
+    True,
+    1,
+    1.0,
+    '1',
+    b'1',
+    [],
+    Path(),
+    _EPOCH,
+    _EPOCH.date(),
+    timedelta(1),
+]
 # A value of each type that operators are tried with.
 SAMPLES: dict[type | None, Any] = {type(each): each for each in _SAMPLES}
 _CONVERSION = re.compile(r'%[-+ #0-9.]*[a-zA-Z]')
@@ -87,6 +100,7 @@ _COMPARED = (
     (tuple,),
     (Message,),
     (array,),
+    (Instance,),
 )
 # What makes a large number of two small ones.
 _POWERS = (ast.Pow, ast.LShift)
@@ -154,6 +168,11 @@ def _combine(sign: ast.operator, left: Value, right: Value) -> Value:
         other = right if left == AGAIN else left
         if isinstance(other, Sequence) and not other.is_lost:
             return Sequence(list(other.items), other.kind, is_open=True)
+    for one, other in ((left, right), (right, left)):
+        if isinstance(one, ArrayField) and one.is_made and _kind(other) in (int, float):
+            is_float = _kind(other) is float or isinstance(sign, ast.Div)
+            kind = 'float64' if is_float else one.type.kind
+            return one if one.type.nested else replace(one, type=replace(one.type, kind=kind))
     if isinstance(left, Sequence):
         return _combine_sequence(sign, left, right)
     kinds = (_kind(left), _kind(right))
@@ -281,7 +300,7 @@ def type_of(value: Value) -> type | None:
             return value.kind
         case Sequence() | Mapping() if not value.is_lost:
             return dict if isinstance(value, Mapping) else value.kind
-        case Message() | MessageClass() | PartOfNode():
+        case Message() | MessageClass() | PartOfNode() | Instance(is_no_value=True):
             return type(value)
         case ArrayField(is_made=False) if value.type.array != 'fixed' and not value.type.nested:
             is_list = value.type.kind in ('bool', 'byte', 'string', 'wstring')

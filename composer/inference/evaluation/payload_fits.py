@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from composer.inference.evaluation.library.known_functions import KNOWN_RESULTS
 from composer.inference.evaluation.operators import explain_unset
 from composer.inference.evaluation.part import Part
-from composer.inference.message_types import in_python
+from composer.inference.message_types import PYTHON_TYPES, in_python
 from composer.inference.values import (
     Alternatives,
     ArrayField,
@@ -182,6 +182,9 @@ class _Fit:
         if all(found):
             return found[0]
         for each, misfits in zip(several, found, strict=True):
+            if is_none(each) and _is_end(each):
+                # Where a helper comes to its end, nobody has thought of it.
+                return misfits
             if isinstance(each, Mapping | Sequence):
                 self.alternatives.append((each, misfits))
         return []
@@ -305,8 +308,15 @@ class _Fit:
             case ArrayField():
                 is_text = field_type.kind in _TEXTS, value.type.kind in _TEXTS
                 nested = field_type.nested, value.type.nested
+                kinds = field_type.kind, value.type.kind
+                is_number = not value.type.nested and 'byte' not in kinds
+                given = PYTHON_TYPES.get(value.type.kind, int)
+                if value.type.array == 'fixed':
+                    size = value.type.array_bound or 0
+                    yield from self._tried(lambda: check_length(field_type, size), place, path)
                 if (
                     is_text[0] != is_text[1]
+                    or (is_number and not _may_hold(field_type.kind, given))
                     or (nested[0] is None) != (nested[1] is None)
                     or (nested[0] and nested[1] and not self.types.are_alike(nested[0], nested[1]))
                 ):
@@ -358,6 +368,11 @@ class _Fit:
     ) -> Misfit:
         message = format_field_error(self.root, path, text)
         return Misfit(rule, message.replace(self.root, in_python(self.root)), place, help_text)
+
+
+def _is_end(value: Value) -> bool:
+    origin = getattr(value, 'origin', None)
+    return origin is not None and isinstance(origin.node, ast.FunctionDef)
 
 
 def _may_hold(kind: str, given: type) -> bool:

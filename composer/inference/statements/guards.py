@@ -67,7 +67,7 @@ class Guards(Part):
                 is_own = isinstance(kind, Class)
                 error = Instance(cast('Class', kind), is_unmade=True) if is_own else None
                 scope.set(handler.name, error or Scalar(Exception))
-            is_doubt = is_doubtful and (_is_guard(handler) or _is_broad(handler))
+            is_doubt = is_doubtful and _is_guard(handler) and not _is_broad(handler)
             # What other types have is read where the type at hand never comes to.
             is_other = handler.type is not None and 'AttributeError' in _names_in(handler.type)
             with run.condition(is_doubt=is_doubt), run.of_other_types(is_other=is_other):

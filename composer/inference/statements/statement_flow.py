@@ -71,8 +71,10 @@ class Statements(Part):
             case ast.Starred():
                 self.store(target.value, UNKNOWN, scope)
             case ast.Tuple() | ast.List():
-                self._evaluator.refuse(Place(scope.module, target), iter, value)
-                for each, part in zip(target.elts, self._parts(value, target.elts), strict=True):
+                place = Place(scope.module, target)
+                self._evaluator.refuse(place, iter, value)
+                parts = self._parts(value, target.elts, place)
+                for each, part in zip(target.elts, parts, strict=True):
                     self.store(each, part, scope)
             case ast.Attribute():
                 owner = self._evaluator.evaluate(target.value, scope)
@@ -81,16 +83,22 @@ class Statements(Part):
             case ast.Subscript():
                 self._store_item(target, value, scope)
 
-    def _parts(self, value: Value, targets: SequenceOf[ast.expr]) -> list[Value]:
+    def _parts(self, value: Value, targets: SequenceOf[ast.expr], place: Place) -> list[Value]:
         """Return what each target gets of something that is unpacked."""
+        starred = any(isinstance(each, ast.Starred) for each in targets)
+        several = alternatives(value)
         rows = [
             [item for item, _ in each.items]
-            for each in alternatives(value)
-            if isinstance(each, Sequence) and each.is_whole and len(each.items) == len(targets)
+            for each in several
+            if isinstance(each, Sequence) and each.is_whole
         ]
-        starred = any(isinstance(each, ast.Starred) for each in targets)
-        if len(rows) == len(alternatives(value)) and not starred:
-            return [join(column) for column in zip(*rows, strict=True)]
+        if len(rows) == len(several) and not starred:
+            fitting = [row for row in rows if len(row) == len(targets)]
+            if fitting == rows:
+                return [join(column) for column in zip(*rows, strict=True)]
+            if not fitting:
+                text = f'this takes {len(targets)} values, and there are {len(rows[0])}'
+                self._evaluator.run.report('bad-index', place, text)
         return [self._evaluator.item_of(value)] * len(targets)
 
     def _store_item(self, target: ast.Subscript, value: Value, scope: Scope) -> None:
@@ -130,13 +138,17 @@ class Statements(Part):
     def _augassign(self, node: ast.AugAssign, scope: Scope) -> None:
         value = self._evaluator.evaluate(node.value, scope)
         before = self._evaluator.read_target(node.target, scope)
+        place = Place(scope.module, node.value)
+        if getattr(before, 'kind', None) is not list:
+            # A list takes anything that can be gone through.
+            self._evaluator.expressions.check_operands(node.op, before, value, place)
         if isinstance(node.target, ast.Name):
             # Arrays are changed in place.
             self._evaluator.read_only.check_write(before, Place(scope.module, node.target))
         if isinstance(node.target, ast.Attribute):
             owner = self._evaluator.evaluate(node.target.value, scope)
             if owner == PartOfNode('state'):
-                self._evaluator.keep(node.target.attr, UNKNOWN)
+                self._evaluator.keep(node.target.attr, combine(node.op, value, value))
                 self._evaluator.waiting.fill(Held('state', node.target.attr))
                 return
         if isinstance(node.target, ast.Subscript):
@@ -145,7 +157,7 @@ class Statements(Part):
                 index = self._evaluator.evaluate(node.target.slice, scope)
                 for each in alternatives(index):
                     if isinstance(each, Constant):
-                        self._evaluator.keep(f'[{each.value}]', UNKNOWN)
+                        self._evaluator.keep(f'[{each.value}]', combine(node.op, value, value))
                 return
         is_union = isinstance(node.op, ast.BitOr)
         if isinstance(before, Mapping) and isinstance(value, Mapping) and is_union:
@@ -155,8 +167,6 @@ class Statements(Part):
         if isinstance(before, Sequence):
             self._evaluator.containers.extend(before, value, Place(scope.module, node.value))
             return
-        place = Place(scope.module, node.value)
-        self._evaluator.expressions.check_operands(node.op, before, value, place)
         self.store(node.target, combine(node.op, before, value), scope)
 
     def _delete(self, node: ast.Delete, scope: Scope) -> None:

@@ -589,9 +589,9 @@ KEPT = """
         ('state.last = m', 'state.last and node.state.last.pose.positon', 'unknown-field'),
         ('state.last = node.now()', '(node.now() - node.state.last).seconds', 'unknown-attribute'),
         ('state.last = m if m.child_frame_id else node.now()', 'state.last.nanoseconds', None),
-        ('state.count = m', 'state.count.positon', None),
+        ('state.count = m', 'state.count.positon', 'unknown-field'),
         ('state.last = m; setattr(node.state, str(m), 3)', 'state.last.positon', None),
-        ('state.last = m; node.state.last += 1', 'state.last.positon', None),
+        ('state.last = m; node.state.last += 1', 'state.last.positon', 'unknown-field'),
     ],
 )
 def test_what_is_kept_in_the_state_is_known_to_other_behaviours(check, kept, read, rule):

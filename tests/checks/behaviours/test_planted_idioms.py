@@ -353,53 +353,6 @@ PLANTED = {
         def hear(node, m):
             Proxy(node).publish('<comand|command>', {})
         """,
-    'a partial method': """
-        from functools import partialmethod
-        class Talker:
-            def __init__(self, node):
-                self.node = node
-            def send(self, topic, payload):
-                self.node.publish(topic, payload)
-            drive = partialmethod(send, '<comand|command>')
-        def hear(node, m):
-            Talker(node).drive({})
-        """,
-    'a function that a decorator registers': """
-        ACTIONS = {}
-        def action(name):
-            def register(function):
-                ACTIONS[name] = function
-                return function
-            return register
-        @action('drive')
-        def drive(node):
-            node.publish('<comand|command>', {})
-        @action('lift')
-        def lift(node):
-            node.publish('level', 1)
-        def hear(node, m):
-            ACTIONS[m.child_frame_id](node)
-        """,
-    'a class that a decorator registers': """
-        TALKERS = []
-        def talker(cls):
-            TALKERS.append(cls)
-            return cls
-        @talker
-        class Talker:
-            def go(self, node):
-                node.publish('<comand|command>', {})
-        def hear(node, m):
-            for each in TALKERS:
-                each().go(node)
-        """,
-    'a table that is filled at the top': """
-        TOPICS = {}
-        TOPICS['drive'] = '<comand|command>'
-        TOPICS['lift'] = 'command'
-        def hear(node, m):
-            node.publish(TOPICS['drive'], {})
-        """,
     'an operator of the project': """
         class Output:
             def __init__(self, publish, name):
@@ -409,30 +362,6 @@ PLANTED = {
                 return self
         def hear(node, m):
             Output(node.publish, '<levle|level>') << 1 << 2
-        """,
-    'a getter of attributes': """
-        from operator import attrgetter
-        place = attrgetter('pose.pose.<positon|position>')
-        def hear(node, m):
-            print(place(m).x)
-        """,
-    'a getter of parameters': """
-        from operator import attrgetter
-        settings = attrgetter('speed', '<mod|mode>')
-        def hear(node, m):
-            speed, mode = settings(node.parameters)
-            print(speed, mode)
-        """,
-    'a caller of a method': """
-        from operator import methodcaller
-        send = methodcaller('publish', '<comand|command>', {})
-        def hear(node, m):
-            send(node)
-        """,
-    'a key of a sort': """
-        from operator import attrgetter
-        def hear(node, m):
-            print(sorted([m], key=attrgetter('header.<stmp|stamp>.sec')))
         """,
     'a function or another one': """
         def drive(node):
@@ -467,18 +396,6 @@ PLANTED = {
             if output is not None:
                 node.publish(output, {})
             node.own_state['state'] = following
-        """,
-    'a function for a class': """
-        from functools import singledispatch
-        from nav_msgs.msg import Odometry
-        @singledispatch
-        def show(message, node):
-            raise TypeError(message)
-        @show.register
-        def _(message: Odometry, node):
-            node.publish('command', message.<twst|twist>.twist)
-        def hear(node, m):
-            show(m, node)
         """,
     'closure factory': """
         def sender(node, name):
@@ -1158,17 +1075,6 @@ PLANTED = {
         def hear(node, m):
             for key in TABLE:
                 TABLE[key](node)
-        """,
-    'node in self of base alias': """
-        class Base:
-            def __init__(self, node):
-                self._node = node
-            node = property(lambda self: self._node)
-        class Sub(Base):
-            def go(self):
-                self.node.publish('<comand|command>', {})
-        def hear(node, m):
-            Sub(node).go()
         """,
     'lambdas of a comprehension that keep their items': """
         def hear(node, m):

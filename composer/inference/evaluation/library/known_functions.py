@@ -68,6 +68,8 @@ KNOWN_RESULTS: dict[str, Value] = {
 }
 KNOWN_RESULTS |= {'builtins.print': NONE, 'time.sleep': NONE}
 KNOWN_RESULTS['rclpy.duration.Duration'] = PartOfNode('duration')
+for _name in ('rclpy.time.Time', 'rclpy.time.Time.from_msg'):
+    KNOWN_RESULTS[_name] = PartOfNode('time')
 CONSTANTS: dict[str, float | str] = {
     **{f'math.{name}': getattr(math, name) for name in ('pi', 'e', 'tau', 'inf', 'nan')},
     **{

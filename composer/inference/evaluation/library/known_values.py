@@ -20,6 +20,7 @@ from composer.inference.values import (
     Generated,
     Mapping,
     Message,
+    PartOfNode,
     Place,
     Scalar,
     Sequence,
@@ -140,7 +141,9 @@ def _sample(value: Value, function: Callable[..., Any] | None = None) -> Any:
             return {key: _json(held) for key, (held, _) in entries.items()}
         case Message():
             return _MESSAGE
-        case ArrayField() if value.type.array != 'fixed' and not value.type.nested:
+        case PartOfNode(name='time' | 'duration') if function is json.dumps:
+            return _MESSAGE
+        case ArrayField(is_made=False) if value.type.array != 'fixed' and not value.type.nested:
             if value.type.kind in ('string', 'wstring'):
                 return ['1']
             return array(_CODES.get(value.type.kind, 'b'), [1])

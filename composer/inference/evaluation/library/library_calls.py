@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.inference.classes.made_records import MadeRecords
 from composer.inference.current_run import name_place
+from composer.inference.evaluation.library.array_calls import ArrayCalls
 from composer.inference.evaluation.library.iterable_calls import IterableCalls
 from composer.inference.evaluation.library.known_functions import (
     ARRANGED,
@@ -91,6 +92,7 @@ class LibraryCalls(Part):
             **self.iterables.handlers(),
             **self.mappings.handlers(),
             **MadeRecords(evaluator).handlers(),
+            **ArrayCalls(evaluator).handlers(),
         }
 
     def call(self, name: str, arguments: Arguments, place: Place) -> Value:
