@@ -78,5 +78,10 @@ def names_used(file: str, values: Mapping[str, Any]) -> dict[str, Any]:
         text = read_file(resolve_path(file, Path())).decode(errors='replace')
     except (PathError, UnreadableFileError, ValueError):
         return dict(values)
-    words = set(re.findall(r'[\w.]+', text)) | set(re.findall(r'\w+', text))
-    return {name: value for name, value in values.items() if name in words}
+    words = set(re.findall(r'\w+', text))
+    # An argument may have dots, dashes and slashes in its name.
+    return {
+        name: value
+        for name, value in values.items()
+        if (name in words if name.isidentifier() else name in text)
+    }

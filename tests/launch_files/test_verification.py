@@ -132,3 +132,26 @@ def test_an_imported_launch_file_is_given_the_same(tmp_path, domain_id):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout == 'drive /right/drive: the same\ndrive /more: the same\n'
+
+
+def component(**keys):
+    written = {'plugin': 'a::B', 'container': 'box', 'name': 'b', 'namespace': '', 'remaps': []}
+    return read_given({**written, 'parameters': {}, 'extra': {}, **keys}, {})
+
+
+@pytest.mark.parametrize(
+    ('one', 'other', 'difference'),
+    [
+        ({'container': '/box', 'namespace': '/'}, {}, []),
+        ({'name': '', 'extra': {'use_intra_process_comms': False}}, {'name': 'B'}, []),
+        (
+            {'parameters': {'x': 1, 'y.z': 'a'}, 'remaps': ['a:=b']},
+            {'parameters': {'x': 2, 'y': {'z': 'a'}}, 'remaps': ['a:=b', 'a:=c']},
+            ['-parameter: x = 1', '+parameter: x = 2'],
+        ),
+    ],
+)
+def test_components_are_compared_by_what_their_container_is_asked(one, other, difference):
+    (found,) = pair([component(**one)], [component(**other)])
+    assert list(found.difference())[2:] == difference
+    assert found.is_same == (not difference)

@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.ament import PACKAGE_INDEX, find_share, list_executables
+from composer.ament import (
+    COMPONENT_INDEX,
+    PACKAGE_INDEX,
+    find_share,
+    list_components,
+    list_executables,
+)
 from composer.errors import ExitCode
 from composer.language.pipeline import load_system
 from composer.launch_files.texts import Computed
@@ -30,7 +36,7 @@ from composer.terminal import escape_output
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from composer.launch_files.results import Entry, Imported
+    from composer.launch_files.results import Imported
     from composer.launch_files.verification.given import Given
 
 # How long nothing may begin any more until all is taken to be there, and at most.
@@ -54,7 +60,7 @@ def verify(launch_file: Path, words: Sequence[str], imported: Imported, system: 
 
     Args:
         words: The arguments of both.
-        system: The file with the system, without components.
+        system: The file with the system.
     """
     with tempfile.TemporaryDirectory(prefix='composer-verify-') as text:
         site = _Site(Path(text) / 'prefix', imported, system.parent)
@@ -66,7 +72,8 @@ def verify(launch_file: Path, words: Sequence[str], imported: Imported, system: 
             folder = Path(text) / str(number)
             same &= _compare(launch_file, [*others, change], system, folder, site)
     for entry in imported.entries:
-        _say_what_is_left_out(entry)
+        if 'launch' in entry.data:
+            click.echo(f'{entry.name}: what it launches was not compared', err=True)
     return ExitCode.DONE if same else ExitCode.FAILED
 
 
@@ -87,7 +94,8 @@ def _compare(
 ) -> bool:
     """Run both with these arguments, and print how they differ; return whether they do not."""
     spec = load_system(system, words).spec
-    expected = len(spec.processes) if spec else 0
+    started = [each for each in spec.processes.values() if not each.external] if spec else []
+    expected = len(started) + len(tuple(spec.components) if spec else ())
     folder.mkdir()
     runs = [
         _Run('launch', launch_file.absolute(), words, folder, site),
@@ -97,21 +105,11 @@ def _compare(
     return _report(launched, composed, expected)
 
 
-def without_components(imported: Imported) -> Imported:
-    """Return a system of plain processes, in place of containers, too: nothing loads stand-ins.
-
-    Without launch files that are not installed: nobody knows what they start.
-    """
-    entries = [
-        replace(
-            entry,
-            section='processes',
-            data={key: value for key, value in entry.data.items() if key != 'components'},
-        )
-        for entry in imported.entries
-        if entry.action is not None
-    ]
-    return replace(imported, entries=entries)
+def without_launch_files(imported: Imported) -> Imported:
+    """Return a system without launch files that are not installed: what they start is unknown."""
+    return replace(
+        imported, entries=[each for each in imported.entries if 'launch' not in each.data]
+    )
 
 
 class _Site:
@@ -133,6 +131,10 @@ class _Site:
         bin_folder = prefix / 'bin'
         bin_folder.mkdir(parents=True)
         for entry in entries:
+            for component in entry.data.get('components', {}).values():
+                self._add_component(
+                    str(_now(component['package'])), str(_now(component['plugin']))
+                )
             if 'package' in entry.data:
                 self._add(str(_now(entry.data['package'])), str(_now(entry.data['executable'])))
             if 'launch' in entry.data:
@@ -165,6 +167,16 @@ class _Site:
             for path in list_executables(package):
                 (folder / path.name).symlink_to(path)
         _make_program(folder / executable)
+
+    def _add_component(self, package: str, plugin: str) -> None:
+        """List a class of components, if its package does not."""
+        if plugin in list_components(package):
+            return
+        self._add_package(package)
+        index = self._prefix / COMPONENT_INDEX / package
+        index.parent.mkdir(parents=True, exist_ok=True)
+        with index.open('a', encoding='utf-8') as file:
+            file.writelines(f'{each};\n' for each in [plugin, *list_components(package)])
 
     def _add_launch_file(self, path: str) -> None:
         """Make an empty launch file of a package that is not installed."""
@@ -246,11 +258,11 @@ class _Run:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        found = sorted(self._written.glob('*.json'), key=lambda each: int(each.stem))
+        found = sorted(self._written.glob('*.json'), key=lambda each: each.stat().st_mtime_ns)
         with self._log as log:
             if len(found) < expected:
                 log.seek(0)
-                click.echo(f'{self._kind}: {len(found)} of {expected} processes began', err=True)
+                click.echo(f'{self._kind}: {len(found)} of {expected} parts began', err=True)
                 click.echo(escape_output(log.read()[-2000:]), err=True)
         texts = (each.read_text(encoding='utf-8') for each in found)
         return [read_given(json.loads(text), self._site.replaced) for text in texts]
@@ -281,11 +293,3 @@ def _report(launched: list[Given], composed: list[Given], expected: int) -> bool
     counts = Counter(each.is_same for each in pairs)
     click.echo(f'{counts[True]} of {max(len(pairs), expected)} are given the same', err=True)
     return min(len(launched), len(composed)) >= expected and not counts[False]
-
-
-def _say_what_is_left_out(entry: Entry) -> None:
-    if 'components' in entry.data:
-        number = len(entry.data['components'])
-        click.echo(f'{entry.name}: its {number} components were not compared', err=True)
-    if 'launch' in entry.data:
-        click.echo(f'{entry.name}: what it launches was not compared', err=True)

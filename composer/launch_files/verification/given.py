@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,9 +39,10 @@ _Loader.add_constructor('tag:yaml.org,2002:python/tuple', _read_tuple)
 
 @dataclass
 class Given:
-    """What a process was given.
+    """What a process, or a component, was given.
 
     Attributes:
+        program: The name of its file, or the class of the component.
         arguments: Those that are not for ROS.
         remaps: Rules, from and to; of two rules for one name, the first.
         parameters: For its node, or by the patterns of nodes if its name is not given.
@@ -84,6 +86,8 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
     Args:
         replaced: Texts in paths, and what they stand for.
     """
+    if 'plugin' in written:
+        return _read_component(json.loads(_replace(json.dumps(written), replaced)))
     argv = [_replace(each, replaced) for each in written['argv']]
     given = Given(argv[0].rpartition('/')[2])
     sources: list[Any] = []
@@ -117,6 +121,19 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
         if not _NOT_COMPARED.fullmatch(key)
     }
     given.folder = _replace(written['cwd'], replaced)
+    return given
+
+
+def _read_component(written: Mapping[str, Any]) -> Given:
+    plugin = written['plugin']
+    given = Given(plugin, [f'in /{written["container"].lstrip("/")}'])
+    # Without a name it has one of its own, which nobody but the container knows.
+    given.name = written['name'] or plugin.rpartition(':')[2]
+    given.namespace = expand_namespace(written['namespace'])
+    for rule in written['remaps']:
+        _add_remap(given, rule)
+    given.parameters = dict(_flat(written['parameters'], ''))
+    given.others = [f'{key} = {value}' for key, value in written['extra'].items() if value]
     return given
 
 

@@ -225,8 +225,7 @@ class Components:
         if name in client.list_nodes(timeout_sec).values():
             message = f"it has a node '{name}' already, which somebody else has loaded"
             raise ContainerError(message)
-        request = _write_request(component, self._system.parameter_files.get(name, {}))
-        unique_id, _ = client.load(request, f"'{component.key}'")
+        unique_id, _ = client.load(self.request_for(component), f"'{component.key}'")
         self._loaded[process.spec.name, component.key] = _Loaded(
             component, process, unique_id, client.servers
         )
@@ -238,6 +237,11 @@ class Components:
                 target=self._watch, name='composer-components', daemon=True
             )
             self._watcher.start()
+
+    def request_for(self, component: ComponentSpec) -> Any:
+        """Return the `LoadNode.Request` for a component."""
+        entries = self._system.parameter_files.get(component.full_name, {})
+        return _write_request(component, entries)
 
     def change(self, container: str, component: ComponentSpec) -> None:
         """Let a loaded component be kept as an edit says."""
