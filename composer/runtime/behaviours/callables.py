@@ -46,7 +46,7 @@ def import_module(name: str) -> ModuleType:
         return importlib.import_module(name)
     except BaseException as error:
         # Python raises Ctrl-C in the main thread; elsewhere it is the module that raises.
-        if (
+        if isinstance(error, ImportAbandonedError) or (
             isinstance(error, KeyboardInterrupt)
             and threading.current_thread() is threading.main_thread()
         ):
