@@ -152,6 +152,7 @@ class EntityHealth:
         '_missed',
         '_past',
         '_reported',
+        '_rests',
         'times',
     )
 
@@ -164,6 +165,7 @@ class EntityHealth:
         self._count_queued: Callable[[], int] = int
         self._past = self._missed = self._all_missed = _NONE_MISSED
         self._reported = 0, _NONE_MISSED
+        self._rests = False
 
     def note_error(self, error: BaseException) -> None:
         """Count a call that raised."""
@@ -181,6 +183,11 @@ class EntityHealth:
         self._update_missed()
         self._past, self._missed = self._all_missed, _NONE_MISSED
         self._count_missed, self._count_queued = count_missed, count_queued
+
+    def rest(self, *, rests: bool) -> None:
+        """Do not count what it misses from now on, as it is told to; or count it again."""
+        self._update_missed()
+        self._rests = rests
 
     def report(
         self, period_sec: float, overdue_sec: float, *, is_measured: bool = False
@@ -217,6 +224,8 @@ class EntityHealth:
         # After the entity was destroyed, nothing is known of it.
         if missed and missed != self._missed:
             self._missed = missed
+            if self._rests:
+                self._past = self._all_missed - missed
             self._all_missed = self._past + missed
 
 

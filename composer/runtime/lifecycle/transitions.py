@@ -218,8 +218,9 @@ class Lifecycle:
 
     def _rest(self, timeout_sec: float | None) -> None:
         """Let nothing begin any more, and wait for what has begun, as long as a stop would."""
-        self._gate.rests = True
         node, me = self._node, get_ident()
+        self._gate.rests = True
+        node.rest_counts(rests=True)
         for timer in node.timers():
             with suppress(InvalidHandle):
                 timer.cancel()
@@ -241,6 +242,7 @@ class Lifecycle:
         node, is_active = self._node, self._machine.current_state[0] == State.PRIMARY_STATE_ACTIVE
         self._let_publish(may_publish=is_active)
         was_resting, self._gate.rests = self._gate.rests, not is_active
+        node.rest_counts(rests=not is_active)
         if is_active and was_resting:
             self._gate.has_refused.clear()
             for timer in node.timers() if self._gate.is_open else ():

@@ -81,6 +81,7 @@ class LiveNode:
         created: The behaviours of entities that other behaviours have created, by their names.
         at_destruction: What ends entities that rclpy's node does not end itself.
         endpoints: Its publishers and subscriptions.
+        counted: The health of those of its entities that may miss something.
         suspended: Behaviours that are ended before `on_stop`.
         limits: How long behaviours may run, by their owners.
         parameters: Its declared parameters, once its entities are created.
@@ -105,6 +106,7 @@ class LiveNode:
     created: dict[str, Callable[..., Any]] = field(default_factory=dict)
     at_destruction: list[Callable[[], None]] = field(default_factory=list)
     endpoints: list[TopicEndpoint] = field(default_factory=list)
+    counted: dict[Owner, EntityHealth] = field(default_factory=dict)
     suspended: list[Suspended] = field(default_factory=list)
     limits: dict[Owner, HangLimit] = field(default_factory=dict)
     running: RunningCalls = field(default_factory=RunningCalls)
@@ -330,7 +332,14 @@ class LiveNode:
     def count_missed(self, owner: Owner, entity: Any, inbox: Inbox | None = None) -> None:
         """Count in the health of an entity what its ROS entity, and its inbox, have missed."""
         counter = count_missed(self.system.executor, self.ros, entity, inbox)
-        self._health(owner).follow(counter, counter.queued)
+        health = self.counted[owner] = self._health(owner)
+        health.follow(counter, counter.queued)
+        health.rest(rests=self.gate.rests)
+
+    def rest_counts(self, *, rests: bool) -> None:
+        """Count nothing that is missed from now on, as its lifecycle is not active; or count."""
+        for health in list(self.counted.values()):
+            health.rest(rests=rests)
 
     def timers(self) -> Iterator[Any]:
         """Yield the rclpy timers that call behaviours."""

@@ -103,6 +103,18 @@ def test_a_report_tells_the_period_and_the_whole():
     assert (second.period_sec, second.overdue_sec) == (2.0, 7.0)
 
 
+def test_what_is_missed_at_rest_does_not_count():
+    health, counts = EntityHealth(), [3]
+    health.follow(lambda: MissedCounts(overruns=counts[-1]))
+    heard = []
+    for rests, count in ((True, 5), (True, 9), (False, 9), (False, 11), (True, 12), (False, 20)):
+        health.rest(rests=rests)
+        counts.append(count)
+        report = health.report(1.0, 0.0)
+        heard.append((report.missed.overruns, report.all_missed.overruns))
+    assert heard == [(3, 3), (0, 3), (0, 3), (2, 5), (0, 5), (8, 13)]
+
+
 def test_an_error_that_cannot_be_shown_counts_too():
     class MuteError(Exception):
         def __str__(self):

@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -173,6 +174,33 @@ def test_what_comes_meanwhile_is_dropped_or_kept(compose, peer, wait_for, local)
     # As many as the queue holds.
     kept = [line.partition('kept ')[2] for line in child.matching('[robot]: kept')]
     assert kept[:2] == ['1 of 1', '2 of 1']
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize('local', ['true', 'false'])
+def test_what_is_kept_as_told_is_no_problem(compose, peer, wait_for, local):
+    text = 'diagnostics: {period: 0.1}\n' + LISTENING.strip() % (local, '')
+    child = compose(text, CODE + GO)
+    child.wait_until_ready()
+    arrays = peer.listen(DiagnosticArray, '/diagnostics', 100)
+
+    def told():
+        return [
+            (status.level, {each.key: each.value for each in status.values})
+            for array in list(arrays)
+            for status in array.status
+            if status.name == '/robot: subscription kept'
+        ]
+
+    lead(peer, CONFIGURE)
+    for number in range(1, 4):
+        peer.call(Trigger, 'go')
+        child.wait_for_line(f'has sent round {number}')
+    lead(peer, ACTIVATE)
+    wait_for(lambda: any(values['calls'] == '2' for _, values in told()), 'both calls')
+    assert {(level, values['queue overruns']) for level, values in told()} == {
+        (DiagnosticStatus.OK, '0')
+    }
     assert child.stop() == 0
 
 
