@@ -79,14 +79,14 @@ def test_add_two_ints_server_answers_an_external_client(up, peers):
     assert peers.ask('ask_for_sum', 'add_two_ints', -7, 2**40) == 2**40 - 7
 
     assert child.stop() == 0
-    # A log message of two lines has its prefix before the first alone.
+    # Lines after the first are indented, so that none looks like a log message of its own.
     start = child.lines.index('[INFO] [minimal_service]: Incoming request')
     assert child.lines[start : start + 6] == [
         '[INFO] [minimal_service]: Incoming request',
-        'a: 2 b: 3',
+        '  a: 2 b: 3',
         '[INFO] [minimal_service]: Sending back response: [5]',
         '[INFO] [minimal_service]: Incoming request',
-        'a: -7 b: 1099511627776',
+        '  a: -7 b: 1099511627776',
         '[INFO] [minimal_service]: Sending back response: [1099511627769]',
     ]
 

@@ -232,7 +232,8 @@ def kill_marked(mark: int, whose: str = 'the system') -> None:
     deadline = time.monotonic() + _KILL_SEC
     while (found := find_marked(mark)) and time.monotonic() < deadline:
         for pid, command in found.items():
-            if pid not in told:
+            # One without a command is about to end.
+            if pid not in told and command:
                 told.add(pid)
                 tell(f'[WARN] [composer]: process {pid} ({command}) outlived {whose}: killed')
             with contextlib.suppress(ProcessLookupError, PermissionError):
