@@ -21,6 +21,7 @@ from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.system_state import Outcome, SystemState, system_title
 from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
+from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
 from composer.runtime.middleware.shared_memory import replacing_ports
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
@@ -214,6 +215,11 @@ class LocalPart:
         """Return the clients that this process knows; see `LostParticipants`."""
         ros = self._any_ros
         return self._handle.lost.list_clients(ros) if ros else frozenset()
+
+    def find_participants(self) -> frozenset[bytes]:
+        """Return the participants of DDS of this process; see `LostParticipants`."""
+        ros = self._any_ros
+        return find_participants(ros, list(self._nodes)) if ros else frozenset()
 
     def _wait_for_clients(self, clients: frozenset[bytes]) -> None:
         """Wait until these are known: whoever is not would get no response."""

@@ -12,12 +12,11 @@ from composer.runtime.health.other_hosts import OtherHosts
 from composer.runtime.hold import wait_until_let_go
 from composer.runtime.local_part import LocalPart
 from composer.runtime.logs import system_logger
-from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.rewiring.goals_in_flight import wait_for_goals
 from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
@@ -221,12 +220,10 @@ class System(LocalPart):
                 self._stop_request.set_code(each)
         return ended
 
-    def lose_nodes(self, names: Collection[str]) -> None:
-        """End what waits, in any process, for servers of nodes whose process was killed."""
-        ros = self._any_ros
-        lost = find_participants(ros, names) if ros else frozenset()
-        self.lose_servers(lost)
-        self.workers.ask('lose_servers', lost)
+    def lose_all_servers(self, participants: frozenset[bytes]) -> None:
+        """End what waits, in any process, for servers of a process that was killed."""
+        self.lose_servers(participants)
+        self.workers.ask('lose_servers', participants)
 
     def fail_request(self, failure: RequestFailure) -> None:
         """See `LocalPart`."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from composer.errors import ComposerError, ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
     from composer.language.specs import ProcessState
@@ -36,8 +36,8 @@ class SystemOfWorkers(Protocol):
     def list_clients(self) -> frozenset[bytes]:
         """Return the clients of services that its process knows."""
 
-    def lose_nodes(self, names: Collection[str]) -> None:
-        """End what waits for servers of nodes whose process was killed."""
+    def lose_all_servers(self, participants: frozenset[bytes]) -> None:
+        """End what waits for servers of a process that was killed; see `LostParticipants`."""
 
     def fail_request(self, failure: RequestFailure) -> None:
         """End the call that waits for the response to a request."""
@@ -91,10 +91,10 @@ class SystemCalls:
         if self.system is not None:
             self.system.request_stop(code)
 
-    def lose_nodes(self, names: Collection[str]) -> None:
-        """End what waits for servers of nodes whose process was killed."""
+    def lose_servers(self, participants: frozenset[bytes]) -> None:
+        """End what waits for servers of a process that was killed; see `LostParticipants`."""
         if self.system is not None:
-            self.system.lose_nodes(names)
+            self.system.lose_all_servers(participants)
 
     def _fail_request(self, failure: RequestFailure) -> None:
         self._begun.fail_request(failure)

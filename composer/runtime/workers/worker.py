@@ -41,6 +41,7 @@ class Worker:
         assignment: What it runs, or is to run once it is started again.
         has_imported: Whether its process has imported its behaviours: from then on it answers.
         is_up: Whether all its nodes have started.
+        participants: Its participants of DDS; see `LostParticipants`.
         is_silent: Whether it was told that it does not answer.
     """
 
@@ -58,6 +59,7 @@ class Worker:
         self.assignment: Assignment | None = None
         self.has_imported = False
         self.is_up = False
+        self.participants = frozenset[bytes]()
         self.is_silent = False
         self._supervisor = supervisor
         self._list_clients = list_clients
@@ -115,7 +117,7 @@ class Worker:
         except ChannelLostError as error:
             raise self.failed_start() from error
         if step == 'create':
-            self.process.mark = result
+            self.process.mark, self.participants = result
         return result
 
     def import_behaviours(self) -> dict[str, Any]:

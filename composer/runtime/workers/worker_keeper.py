@@ -11,7 +11,7 @@ from composer.processes.worker_supervisor import WorkerSupervisor
 from composer.runtime.workers.losses import describe_losses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from composer.language.specs import SystemSpec
     from composer.processes.external_process import ExternalProcess
@@ -39,7 +39,7 @@ class WorkerKeeper:
     Args:
         list_workers: Returns those that there are.
         end_system: Ends the system with an exit code.
-        lose_nodes: Ends what waits for servers of nodes whose process was killed.
+        lose_servers: Ends what waits for servers of participants of DDS that were killed.
 
     Attributes:
         supervisor: Runs their processes.
@@ -52,7 +52,7 @@ class WorkerKeeper:
         self,
         list_workers: Callable[[], Iterable[Worker]],
         end_system: Callable[[int], None],
-        lose_nodes: Callable[[Collection[str]], None],
+        lose_servers: Callable[[frozenset[bytes]], None],
     ) -> None:
         self.log = cast('EscapingLogger', _LazyLogger())
         self.supervisor = WorkerSupervisor(self.log, end_system, KILL_SEC)
@@ -63,7 +63,7 @@ class WorkerKeeper:
         self.is_stopping = False
         self._list_workers = list_workers
         self._end_system = end_system
-        self._lose_nodes = lose_nodes
+        self._lose_servers = lose_servers
         # Held while a worker is started again, or the system edited.
         self._lock = threading.Lock()
         self._restarting: Worker | None = None
@@ -112,7 +112,7 @@ class WorkerKeeper:
         if worker is None:
             return
         # Before it is started again: what comes then has the same names.
-        self._lose_nodes(worker.nodes)
+        self._lose_servers(worker.participants)
         if worker.is_up and self.spec is not None:
             name = worker.name
             self.log.error(f"worker '{name}' has ended; {describe_losses(self.spec, name)}")

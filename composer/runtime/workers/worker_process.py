@@ -163,11 +163,16 @@ class WorkerProcess:
         with suppress(_UnwantedError), self._fresh.pop_all():
             raise _UnwantedError
 
-    def create(self, assignment: Assignment, clients: frozenset[bytes]) -> int:
-        """Create the nodes; return what marks the processes that their behaviours start.
+    def create(
+        self, assignment: Assignment, clients: frozenset[bytes]
+    ) -> tuple[int, frozenset[bytes]]:
+        """Create the nodes.
 
         Args:
             clients: See `LocalPart.create`.
+
+        Returns:
+            What marks the processes that their behaviours start, and its participants of DDS.
 
         Raises:
             StartError: One of them cannot be created.
@@ -178,7 +183,7 @@ class WorkerProcess:
         self._system = WorkerSystem(assignment, self._functions, self._channel)
         threading.Thread(target=self._wait, name='worker', daemon=True).start()
         self._system.create(clients)
-        return self._system.mark
+        return self._system.mark, self._system.find_participants()
 
     def _wait(self) -> None:
         system = self._running

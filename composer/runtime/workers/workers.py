@@ -77,7 +77,7 @@ class Workers:
         # Those that the start, or an edit, brings.
         self._coming: dict[str, Worker] = {}
         self._calls = SystemCalls(self.find_hidden)
-        self._keeper = WorkerKeeper(self._list, self._calls.request_stop, self._calls.lose_nodes)
+        self._keeper = WorkerKeeper(self._list, self._calls.request_stop, self._calls.lose_servers)
         self._supervisor = self._keeper.supervisor
         self._watch = WorkerWatch(self._list, self._keeper.log)
         self._stops: queue.SimpleQueue[tuple[int, bool]] = queue.SimpleQueue()
