@@ -28,21 +28,12 @@ def check(path: str | Path) -> list[Diagnostic]:
 
     The file is checked in each combination that it names under `check:`.
     """
-    from composer.checks.absent_packages import AbsentPackages
-    from composer.checks.checker import check_system
-    from composer.interfaces.catalogue import InterfaceCatalogue
-    from composer.language.pipeline import load_combinations
-    from composer.reports.report import CheckedFile, Report, name_combinations
+    from composer.application.check import CheckOptions
+    from composer.application.check import check as find_errors
 
-    catalogue, absent = InterfaceCatalogue(), AbsentPackages()
-    files = [
-        CheckedFile(
-            str(path), tuple(absent.leave_out(check_system(system, catalogue))), combination=name
-        )
-        for name, system in load_combinations(Path(path))
-    ]
-    found = Report(tuple(name_combinations(files))).findings
-    return sorted(found, key=lambda finding: finding.sort_key)
+    return sorted(
+        find_errors([str(path)], CheckOptions()).findings, key=lambda each: each.sort_key
+    )
 
 
 def up(
@@ -68,7 +59,7 @@ def up(
         StartError: The system could not start.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong.
     """
-    from composer.cli.starting.up import up as run
+    from composer.application.up import up as run
 
     paths = [Path(each) for each in (path, *layers)]
     return run(paths, words, ros_arguments, log_levels, set_values)

@@ -28,7 +28,7 @@ _READ_ONCE = ('PYTHON', 'LANG', 'LC_', 'LD_', 'OMP_', 'OPENBLAS_', 'NPY_')
 _IMPORTED = (
     'composer.checks.checker',
     'composer.cli.main',
-    'composer.cli.starting.reload',
+    'composer.application.reloader',
     'numpy',
 )
 # The folder of the server stands in its search path for that of a child.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.ament import ament_prefixes
-from composer.cli.common.output import show_findings
+from composer.application.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.interfaces.build.build_cache import list_built

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from composer.application.file_selection import load_given
 from composer.checks.checker import check_system
-from composer.cli.common.file_selection import load_given
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, StartError, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import composer
+from composer.application.file_selection import list_systems
 from composer.checks.checker import check_system
-from composer.cli.common.file_selection import list_systems
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.reports.text import render_finding

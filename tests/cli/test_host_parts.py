@@ -6,7 +6,7 @@ from textwrap import dedent
 
 import pytest
 
-from composer.cli.common.system_reader import SystemReader
+from composer.application.system_reader import SystemReader
 from composer.cli.main import run
 from composer.errors import UsageError
 from composer.language.values.start_reader import StartValueReader

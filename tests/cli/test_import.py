@@ -4,8 +4,8 @@ import importlib.util
 
 import pytest
 
+from composer.application.importing.verification import other_values
 from composer.cli.importing.import_launch import check_imported
-from composer.cli.importing.verification import other_values
 from composer.cli.main import run
 from composer.launch_files.results import Argument, Imported
 

@@ -269,7 +269,7 @@ def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
     def fail(path, **more):
         raise raised
 
-    monkeypatch.setattr('composer.cli.checking.check.load_combinations', fail)
+    monkeypatch.setattr('composer.application.check.load_combinations', fail)
     code, out, err = run('check', GREETER)
     assert (code, out) == (3, '')
     lines = err.splitlines()
@@ -293,7 +293,7 @@ def test_what_is_raised_on_purpose_becomes_an_exit_code(run, monkeypatch, raised
     def fail(path, **more):
         raise raised
 
-    monkeypatch.setattr('composer.cli.checking.check.load_combinations', fail)
+    monkeypatch.setattr('composer.application.check.load_combinations', fail)
     assert run('check', GREETER) == (code, '', said)
 
 

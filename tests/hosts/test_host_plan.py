@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from composer.application.system_reader import list_files
 from composer.checks.checker import check_in_context, create_context
-from composer.cli.common.system_reader import list_files
 from composer.diagnostics import has_errors
 from composer.hosts.host_parts import PartSources, build_part
 from composer.hosts.host_plan import find_space_problem, plan_host

@@ -76,7 +76,7 @@ def test_a_stand_in_is_given_what_the_program_would_be(tmp_path, domain_id):
     (tmp_path / 'written').mkdir()
     words = ['system', str(tmp_path / 'written'), 'sh', str(path)]
     subprocess.run(
-        [sys.executable, '-m', 'composer.cli.importing.stand_in_runs', *words],
+        [sys.executable, '-m', 'composer.application.importing.stand_in_runs', *words],
         env=os.environ | {'ROS_DOMAIN_ID': str(domain_id)},
         check=True,
         capture_output=True,

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.application.output import wants_colour
 from composer.checks.environment import find_environment_problems
-from composer.cli.common.output import wants_colour
 from composer.errors import StartError
 from composer.runtime.environment import (
     check_log_folder,

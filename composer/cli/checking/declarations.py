@@ -113,20 +113,17 @@ def check_command(  # noqa: PLR0913 - one for each option
     of the one before it.
     """
     gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
-    from composer.cli.checking.check import CheckOptions, check
+    from composer.application.check import CheckOptions
+    from composer.cli.checking.check import ReportOptions, check
 
     # The name of a type checker is a word of its own: the option works without.
     type_checker = next((word for word in words if types and word in TYPE_CHECKERS), None)
     words = tuple(word for word in words if word != type_checker)
     options = CheckOptions(
-        format=format_name,
-        output=output,
         set_values=set_values,
         matrix=matrix,
         is_strict=strict,
         ignored=ignored,
-        expected=expected,
-        is_quiet=quiet,
         imports=imports,
         types=types,
         type_checker=type_checker,
@@ -135,7 +132,7 @@ def check_command(  # noqa: PLR0913 - one for each option
         stdin_name=stdin_filename,
     )
     refuse_options(words)
-    return check(words, options)
+    return check(words, options, ReportOptions(format_name, output, expected, quiet))
 
 
 @click.command('plan', context_settings=NUMBERS_ARE_VALUES)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.output import wants_colour
+from composer.application.output import wants_colour
 from composer.errors import ExitCode
 from composer.rules import load_families, load_rule
 from composer.rules.examples import load_example

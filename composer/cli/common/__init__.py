@@ -1,1 +1,1 @@
-"""What the commands share: their arguments, the files these name, and output."""
+"""The parameters that commands share."""

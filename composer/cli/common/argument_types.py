@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import os
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from composer.errors import UsageError
-from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
 _Command = TypeVar('_Command', bound='Callable[..., Any]')
 
 # Negative numbers are values; `split_words` refuses everything else that starts with a dash.
 NUMBERS_ARE_VALUES = {'ignore_unknown_options': True}
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
-# Of the systems in a folder, the first are listed.
-_MOST_LISTED = 20
 # A dash before a digit or a dot starts a number.
 _OPTION = re.compile(r'-[^\W\d]|--')
 
@@ -86,27 +82,14 @@ def takes_format(
 def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Split the words of the current command into files and the arguments that follow them.
 
-    The first word is a file, and so are the words right after it that end in `.yaml` or `.yml`;
-    `name:=value` is always an argument.
-
     Raises:
         click.UsageError: There is no file, or an unknown option.
         UsageError: The first word is empty, or a folder.
     """
+    from composer.application import file_selection
+
     refuse_options(words)
-    if not words[0]:
-        message = 'the file name is empty'
-        raise UsageError(message, help='is a shell variable unset?')
-    if os.path.isdir(words[0]):
-        raise _folder_error(words[0])
-    count = 1
-    while count < len(words) and _is_layer(words[count]):
-        count += 1
-    return [Path(word) for word in words[:count]], list(words[count:])
-
-
-def _is_layer(word: str) -> bool:
-    return word.endswith(('.yaml', '.yml')) and ':=' not in word
+    return file_selection.split_words(words)
 
 
 def refuse_options(words: Sequence[str]) -> None:
@@ -174,18 +157,6 @@ def check_rule(
     if value is not None:
         _find_rule(value)
     return value
-
-
-def _folder_error(folder: str) -> UsageError:
-    from composer.cli.common.file_selection import (
-        list_systems,
-    )
-
-    systems = [escape(str(path)) for path in list_systems(Path(folder))]
-    shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]
-    listed = '\n'.join(f'  {each}' for each in shown)
-    message = f"'{folder}' is a folder, and a system is one file"
-    return UsageError(message, help=f'it holds\n{listed}' if systems else 'it holds no system')
 
 
 def _find_rule(name: str) -> None:

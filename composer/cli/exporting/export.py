@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.application.file_selection import load_given
+from composer.application.output import show_findings
+from composer.application.system_reader import list_files
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.placement.hosts_and_workers import find_unplaced
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings
-from composer.cli.common.system_reader import list_files
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
 from composer.export import render_files

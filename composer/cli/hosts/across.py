@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from composer import signals
+from composer.application.file_selection import load_given
+from composer.application.output import show_findings
+from composer.application.running_systems import answer_forms
+from composer.application.running_systems.client import RunningSystem
 from composer.cli.common.argument_types import split_words
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings
 from composer.cli.hosts.top_hosts import merge_health, watch_hosts
-from composer.cli.running import answer_forms
-from composer.cli.running.client import RunningSystem
 from composer.cli.running.ps import print_systems
 from composer.cli.running.top import has_screen, print_health
 from composer.diagnostics import has_errors

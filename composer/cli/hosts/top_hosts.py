@@ -7,7 +7,7 @@ import threading
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.running import answer_forms
+from composer.application.running_systems import answer_forms
 from composer.errors import ComposerError
 from composer.hosts.asking import composer_command, follow_all
 from composer.terminal import escape

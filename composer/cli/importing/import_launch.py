@@ -75,7 +75,7 @@ def import_launch_file(
         is_refused = check_imported(checked, arguments)
         if is_refused or not verifies:
             return ExitCode.FAILED if is_refused else ExitCode.DONE
-        from composer.cli.importing.verification import verify, without_launch_files
+        from composer.application.importing.verification import verify, without_launch_files
 
         copy = Path(temporary) / 'plain' / f'{stem}.yaml'
         list(_write(render_system(without_launch_files(imported), path.name, stem), copy))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.running.client import Client
-from composer.cli.running.discovery import Discovery
+from composer.application.running_systems.client import Client
+from composer.application.running_systems.discovery import Discovery
 from composer.cli.running.tables import format_duration, render_table
 from composer.errors import ExitCode
 from composer.terminal import escape
@@ -18,7 +18,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from composer.cli.running.client import RunningSystem
+    from composer.application.running_systems.client import RunningSystem
 
 _HEADER = ('NAME', 'STATE', 'HEALTH', 'NODES', 'UPTIME', 'LAST RELOAD', 'HOST', 'PID', 'FILE')
 _LONGEST_NOTE = 200

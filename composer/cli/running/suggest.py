@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 import os
-import tempfile
-import time
 from dataclasses import replace
-from pathlib import Path
-from socket import gethostname
 from typing import TYPE_CHECKING
 
 import click
 
+from composer.application.file_selection import load_given
+from composer.application.output import show_findings
 from composer.checks.checker import create_context
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
-from composer.suggestions.figures import Measured, average_answers, read_recorded
+from composer.suggestions.figures import read_recorded
 from composer.suggestions.measured_load import build_load
-from composer.suggestions.other_programs import cores_of_others, read_processors
+from composer.suggestions.movable_nodes import find_movable
 from composer.suggestions.suggestion import suggest_split
 from composer.suggestions.text import render_json, render_layer, render_text
-from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Sequence
+    from pathlib import Path
 
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
     from composer.suggestions.suggestion import Suggestion
-
-_PROBE = 'composer_suggest_probe'
-_POLL_SEC = 0.1
 
 
 @record
@@ -79,8 +72,10 @@ def suggest(
     if has_errors(system.diagnostics) or system.spec is None:
         return ExitCode.FAILED
     spec = _part_of(system.spec, options.host)
+    from composer.application.running_systems.health import measure
+
     measured = (
-        _watch(spec.name, options.seconds)
+        measure(spec.name, options.seconds)
         if options.recording is None
         else read_recorded(options.recording, spec.name)
     )
@@ -88,7 +83,7 @@ def suggest(
     if context is None:
         return ExitCode.FAILED
     keys = {node.full_name: key for key, node in spec.nodes.items()}
-    movable = _find_movable(load, system.spec, keys.values())
+    movable = find_movable(load, system.spec, keys.values())
     fixed = frozenset(name for name, key in keys.items() if key not in movable)
     if options.cores:
         # Who else uses those is not known.
@@ -116,67 +111,6 @@ def _part_of(spec: SystemSpec, host: str) -> SystemSpec:
         named = ', '.join(filter(None, hosts))
         raise ComposerError(message, help=f'say which one with --host: {named}')
     return spec
-
-
-def _watch(name: str, seconds: float) -> Measured:
-    """Return what a running system says of itself for some time."""
-    from composer.cli.running import answer_forms
-    from composer.cli.running.client import STATUS_SEC, Client
-    from composer.cli.running.discovery import Discovery
-    from composer.runtime.control import protocol
-
-    answers = {}
-    with Client() as client:
-        system = Discovery(client).find(name)
-        is_here = (system.status or {}).get('host') == gethostname()
-        before, began, own_sec = read_processors(), time.monotonic(), time.process_time()
-        with client.asking(system, protocol.TOP) as ask:
-            deadline = time.monotonic() + seconds
-            while True:
-                outcome = ask(STATUS_SEC)
-                if not outcome.succeeded:
-                    raise ComposerError(outcome.text)
-                answer = answer_forms.read_answer(outcome.text, answer_forms.TOP)
-                if answer['has_cpu']:
-                    answers[answer['period']] = answer
-                if time.monotonic() >= deadline and answers:
-                    break
-                if time.monotonic() >= deadline + STATUS_SEC + 3 * answer['period_sec']:
-                    break
-                time.sleep(min(_POLL_SEC, answer['period_sec'] / 2))
-        after, elapsed_sec = read_processors(), time.monotonic() - began
-        own_sec = time.process_time() - own_sec
-    entities = average_answers(answers.values())
-    if not entities:
-        message = f"system '{name}' does not say what its calls cost"
-        raise ComposerError(message, help='its interpreter cannot be watched: see docs/running.md')
-    processes = [each for answer in answers.values() for each in answer['processes']]
-    cores = max((each['cores'] for each in processes), default=None)
-    used = sum(each['cpu'] or 0.0 for each in processes) / len(answers) + own_sec / elapsed_sec
-    others = cores_of_others(before, after, used, cores) if is_here and cores else 0.0
-    return Measured(entities, cores, {}, others)
-
-
-def _find_movable(
-    load: Callable[..., LoadedSystem], spec: SystemSpec, keys: Iterable[str]
-) -> set[str]:
-    """Return the keys of nodes that a layer can move: not those of includes, and of loops."""
-    keys = list(keys)
-    found = _probe(load, spec, keys)
-    # What one of them makes wrong may be all of it.
-    return found or {key for key in keys if _probe(load, spec, [key])}
-
-
-def _probe(load: Callable[..., LoadedSystem], spec: SystemSpec, keys: Sequence[str]) -> set[str]:
-    with tempfile.NamedTemporaryFile('w', suffix='.yaml', encoding='utf-8') as file:
-        file.write(render_yaml({'nodes': {key: {'worker': _PROBE} for key in keys}}))
-        file.flush()
-        moved = load(Path(file.name))
-    if has_errors(moved.diagnostics) or moved.spec is None:
-        return set()
-    if moved.spec.nodes.keys() != spec.nodes.keys():
-        return set()
-    return {key for key in keys if moved.spec.nodes[key].worker == _PROBE}
 
 
 def _tell(

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import json
 import sys
-import threading
 import time
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.cli.running import answer_forms
-from composer.cli.running.client import STATUS_SEC, Client
-from composer.cli.running.discovery import Discovery
+from composer.application.running_systems.client import STATUS_SEC, Client
+from composer.application.running_systems.discovery import Discovery
+from composer.application.running_systems.health import (
+    POLL_SEC,
+    Poller,
+    read_health,
+    wait_for_health,
+)
 from composer.cli.running.top_table import (
     describe_worst,
     find_worst,
     render_entities,
     select_entities,
 )
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ExitCode
 from composer.runtime.control import protocol
 from composer.terminal import is_output_unread
 
@@ -28,10 +32,6 @@ if TYPE_CHECKING:
 
     from composer.cli.running.top_table import View
     from composer.runtime.health.system_state import Outcome
-
-_POLL_SEC = 0.1
-# What calls cost is known after the second period that somebody looks, as a rule.
-_MOST_PERIODS = 3
 
 
 def top(
@@ -56,7 +56,7 @@ def top(
         with client.asking(system, protocol.TOP) as ask:
             if each_period:
                 return _print_each(ask)
-            document = _wait_for_all(ask)
+            document = wait_for_health(ask)
             print_health(document, view, format_name)
             return ExitCode.DONE
 
@@ -79,31 +79,15 @@ def print_health(document: dict[str, Any], view: View, format_name: str) -> None
         click.echo('\n'.join([*render_entities(entities), *lines]))
 
 
-def _read(outcome: Outcome) -> dict[str, Any]:
-    if not outcome.succeeded:
-        raise ComposerError(outcome.text)
-    return answer_forms.read_answer(outcome.text, answer_forms.TOP)
-
-
 def _print_each(ask: Callable[[float], Outcome]) -> int:
     printed = None
     while not is_output_unread():
-        document = _read(ask(STATUS_SEC))
+        document = read_health(ask(STATUS_SEC))
         if document['period'] != printed:
             click.echo(json.dumps(document))
             printed = document['period']
-        time.sleep(max(_POLL_SEC, document['period_sec'] / 2))
+        time.sleep(max(POLL_SEC, document['period_sec'] / 2))
     return ExitCode.DONE
-
-
-def _wait_for_all(ask: Callable[[float], Outcome]) -> dict[str, Any]:
-    """Return the health in the first period in which all of it was measured."""
-    document = _read(ask(STATUS_SEC))
-    deadline = time.monotonic() + STATUS_SEC + _MOST_PERIODS * document['period_sec']
-    while not document['has_cpu'] and time.monotonic() < deadline:
-        time.sleep(_POLL_SEC)
-        document = _read(ask(STATUS_SEC))
-    return document
 
 
 def _watch(name: str | None, view: View) -> int:
@@ -119,56 +103,3 @@ def _watch(name: str | None, view: View) -> int:
     if error is not None:
         raise error
     return ExitCode.DONE
-
-
-class Poller:
-    """A thread that finds a system and asks it again and again, so the screen does not wait.
-
-    Args:
-        name: Of the system; `None` for the only one.
-
-    Attributes:
-        waits_for: Why there is no answer yet.
-        document: The last answer; `None` before the first.
-        error: Why there are no more answers.
-    """
-
-    def __init__(self, name: str | None) -> None:
-        self._name = name
-        self.waits_for = 'starting ROS'
-        self.document: dict[str, Any] | None = None
-        self.error: Exception | None = None
-        self._client: Client | None = None
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def start(self) -> None:
-        """Begin to ask."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Ask no more."""
-        self._ended.set()
-        if self._client is not None:
-            self._client.interrupt()
-        self._thread.join()
-
-    def _run(self) -> None:
-        try:
-            with Client() as self._client:
-                self._ask_all(self._client)
-        except Exception as error:  # noqa: BLE001 - it is raised when the screen has gone
-            self.error = error
-
-    def _ask_all(self, client: Client) -> None:
-        what = 'the system' if self._name is None else f"system '{self._name}'"
-        self.waits_for = f'looking for {what} (ROS_DOMAIN_ID {client.domain_id})'
-        if self._ended.is_set():
-            return
-        system = Discovery(client).find(self._name)
-        self.waits_for = f"waiting for the answer of system '{system.name}'"
-        with client.asking(system, protocol.TOP) as ask:
-            pause_sec = 0.0
-            while not self._ended.wait(pause_sec):
-                self.document = _read(ask(STATUS_SEC))
-                pause_sec = max(_POLL_SEC, self.document['period_sec'] / 2)

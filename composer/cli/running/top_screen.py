@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import Any, Protocol
 
 from composer import signals
-from composer.cli.common.output import wants_colour
+from composer.application.output import wants_colour
 from composer.cli.running.top_table import (
     SORT_NAMES,
     View,

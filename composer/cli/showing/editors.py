@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.application.file_selection import load_given, select_systems
+from composer.application.output import show_findings, write_file
 from composer.checks.checker import create_context
-from composer.cli.checking.check import select_systems
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings, write_file
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue

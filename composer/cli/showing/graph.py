@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from composer.application.file_selection import load_given
+from composer.application.output import show_findings, write_file
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings, write_file
 from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
 from composer.errors import ExitCode, UsageError

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from composer.application.file_selection import load_given
+from composer.application.output import show_findings
 from composer.checks.checker import create_context
 from composer.checks.parameter_files import check_parameter_files
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings
 from composer.cli.showing.show_comments import append_comments, find_kept_comments
 from composer.confidential import origin_of
 from composer.diagnostics import has_errors

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from composer.application.recording_options import RecordingOptions
 from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
     check_log_levels,
@@ -14,7 +15,6 @@ from composer.cli.common.argument_types import (
     takes_system,
     takes_topics,
 )
-from composer.cli.common.recording_options import RecordingOptions
 from composer.errors import ExitCode
 from composer.terminal import escape
 
@@ -90,13 +90,13 @@ def up_command(  # noqa: PLR0913 - one for each option
     by name, NAME:=VALUE, or in their order, VALUE. ROS arguments follow --ros-args and go to every
     node.
     """
-    from composer.cli.starting.up import describe_file_arguments, up
+    from composer.application.up import up
 
     if wants_help:
         click.echo(context.get_help())
         if words:
             paths, _ = split_words(words)
-            click.echo(f'\n{escape(str(paths[0]))}: {describe_file_arguments(paths)}')
+            click.echo(f'\n{escape(str(paths[0]))}: {_describe_arguments(paths)}')
         return ExitCode.DONE
     paths, arguments = split_words(words)
     if detaches:
@@ -124,4 +124,15 @@ def up_command(  # noqa: PLR0913 - one for each option
         hold=hold,
         ends_process=True,
         rehearses=rehearses,
+    )
+
+
+def _describe_arguments(paths: list[Path]) -> str:
+    """Return the arguments that a file declares, as `--help` shows them."""
+    from composer.application.file_selection import load_given
+    from composer.language.arguments import describe_arguments
+
+    system = load_given(paths)
+    return (
+        'the file cannot be read' if system.spec is None else describe_arguments(system.arguments)
     )

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN
 from composer.cli.common.argument_types import takes_format
-from composer.cli.testing.scenario_selection import DEFAULT_PATTERN
 
 FORMATS = ('text', 'json', 'github')
 
@@ -79,7 +79,7 @@ def test_command(  # noqa: PLR0913 - one for each option
 
     Exit codes: 0 all passed, 1 something failed, 2 wrong usage, 5 there are no cases.
     """
-    from composer.cli.testing.run_options import RunOptions
+    from composer.application.test_runs.run_options import RunOptions
     from composer.cli.testing.test import run_tests
 
     options = RunOptions(

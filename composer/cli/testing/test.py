@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from composer import signals
-from composer.cli.common.output import wants_colour, write_file
-from composer.cli.testing.case_plan import plan_cases
-from composer.cli.testing.case_runs import CaseRuns
-from composer.cli.testing.name_expressions import parse_name_expression
-from composer.cli.testing.scenario_selection import DEFAULT_PATTERN, select_scenarios
+from composer.application.output import wants_colour, write_file
+from composer.application.test_runs.case_plan import plan_cases
+from composer.application.test_runs.case_runs import CaseRuns
+from composer.application.test_runs.name_expressions import parse_name_expression
+from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN, select_scenarios
 from composer.errors import ExitCode
 from composer.reports.text import render_finding
 from composer.runtime.environment import check_ros, find_colour
@@ -27,9 +27,9 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from composer.cli.testing.case_plan import CasePlan
-    from composer.cli.testing.name_expressions import Condition
-    from composer.cli.testing.run_options import RunOptions
+    from composer.application.test_runs.case_plan import CasePlan
+    from composer.application.test_runs.name_expressions import Condition
+    from composer.application.test_runs.run_options import RunOptions
     from composer.scenarios.reports.run_report import CaseReport
 
 

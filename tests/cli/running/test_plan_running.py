@@ -8,8 +8,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.application.file_selection import load_given
 from composer.checks.checker import create_context
-from composer.cli.common.file_selection import load_given
 from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system

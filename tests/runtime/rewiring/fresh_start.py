@@ -60,8 +60,8 @@ class FreshStarter:
 
 
 def _read(reader):
+    from composer.application.file_selection import load_given
     from composer.checks.checker import create_context
-    from composer.cli.common.file_selection import load_given
     from composer.interfaces.catalogue import InterfaceCatalogue
 
     system = load_given(reader.paths, reader.words, reader.set_values, reader=reader.reader)
@@ -78,8 +78,8 @@ def running_system(paths, workers=None, *, checks=True):
     Raises:
         ComposerError: It has errors, or cannot start.
     """
-    from composer.cli.common.system_reader import SystemReader, import_reading
-    from composer.cli.starting.reload import Reloader
+    from composer.application.reloader import Reloader
+    from composer.application.system_reader import SystemReader, import_reading
     from composer.errors import ComposerError
     from composer.planning.snapshot_taking import take_snapshot
     from composer.processes.guardian_client import GuardianClient
@@ -172,10 +172,10 @@ def _serve(paths):
 
 
 def _import_all(paths):
-    from composer.cli.common.system_reader import SystemReader
+    from composer.application.system_reader import SystemReader
 
     for name in (
-        *('composer.cli.starting.reload', 'composer.runtime.run', 'composer.runtime.system'),
+        *('composer.application.reloader', 'composer.runtime.run', 'composer.runtime.system'),
         *('std_msgs.msg', 'std_srvs.srv', 'test_msgs.action', 'diagnostic_msgs.msg'),
         *('tests.runtime.rewiring.inspections', 'tests.runtime.rewiring.observing'),
         *(f'{each}.{each}_s__rosidl_typesupport_c' for each in _MESSAGES),

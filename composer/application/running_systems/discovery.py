@@ -6,8 +6,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from composer.cli.running import answer_forms
-from composer.cli.running.client import RunningSystem, wait_until
+from composer.application.running_systems import answer_forms
+from composer.application.running_systems.client import RunningSystem, wait_until
 from composer.errors import ComposerError, UsageError
 from composer.runtime.control import protocol
 from composer.runtime.control.name_claim import find_address, list_claims
@@ -16,7 +16,7 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from composer.cli.running.client import Client
+    from composer.application.running_systems.client import Client
 
 # How long systems on other hosts may take to be found, and those that are on this one for sure.
 _SEARCH_SEC = 1.0

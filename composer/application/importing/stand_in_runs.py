@@ -1,7 +1,7 @@
 """Run a launch file or a system with stand-ins for its programs, in a process of its own.
 
-`python -m composer.cli.importing.stand_in_runs launch|system FOLDER ENDS FILE [NAME:=VALUE]…`,
-with the names of the programs that end at once, separated by commas.
+The arguments of the module are `launch` or `system`, the folder that stand-ins write to, the names
+of the programs that end at once, separated by commas, the file, and its arguments.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.main import run
+from composer.application.up import up
 from composer.launch_files.launched_programs import SLEEP
 from composer.launch_files.verification import stand_in
 from composer.processes.process_commands import CommandWriter
@@ -126,7 +126,7 @@ def run_system(path: str, arguments: list[str], stand_ins: StandIns) -> int:
 
     setattr(components.Components, 'waiters', write_loads)  # noqa: B010 - here alone, too
     setattr(CommandWriter, 'write', write_stand_in)  # noqa: B010 - for this process alone
-    return run(['up', path, *arguments, '--no-control'])
+    return up([Path(path)], arguments, is_asked=False, ends_process=True)
 
 
 if __name__ == '__main__':

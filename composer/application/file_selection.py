@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 
 from composer.diagnostics import Diagnostic, has_errors
 from composer.entity_kinds import WORK_KEYS
+from composer.errors import UsageError
 from composer.input_limits import MAX_FILE_BYTES, UnreadableFileError, read_file
 from composer.language.pipeline import load_system
 from composer.records import record
 from composer.scenarios.recognition import is_scenario_file
 from composer.schema.structure import known_keys
+from composer.terminal import escape
 from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ _SCHEMA = 'composer.schema.json'
 # Not searched: these hold other people's files. Hidden folders belong to tools.
 _SKIPPED_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
 _MAX_BYTES_READ = 1_000_000
+# Of the systems in a folder, the first are listed.
+_MOST_LISTED = 20
 
 # The similarity of two words that differ by one letter.
 _SIMILAR = 0.8
@@ -109,6 +113,51 @@ def select_files(words: Sequence[str], *, skip_other_files: bool = False) -> Sel
     for system in systems:
         once.setdefault(tuple(map(_identity, (system.path, *system.layers))), system)
     return Selection(tuple(once.values()), tuple(findings), tuple(scenarios.values()))
+
+
+def select_systems(
+    words: Sequence[str], *, is_one: bool, skip_other_files: bool = False
+) -> Selection:
+    """Return the systems that a command line gives: one, as to `composer up`, or several.
+
+    Args:
+        is_one: Whether an option says that it is one; arguments say so, too.
+
+    Raises:
+        UsageError: It is one, and the first word is no file.
+    """
+    if not (is_one or has_arguments(words)):
+        return select_files(words, skip_other_files=skip_other_files)
+    (path, *layers), arguments = split_words(words)
+    return Selection((SelectedSystem(path, tuple(layers), tuple(arguments)),))
+
+
+def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """Split the words of a command line into files and the arguments that follow them.
+
+    The first word is a file, and so are the words right after it that end in `.yaml` or `.yml`;
+    `name:=value` is always an argument.
+
+    Raises:
+        UsageError: The first word is empty, or a folder.
+    """
+    if not words[0]:
+        message = 'the file name is empty'
+        raise UsageError(message, help='is a shell variable unset?')
+    if os.path.isdir(words[0]):
+        raise _folder_error(words[0])
+    count = 1
+    while count < len(words) and words[count].endswith(_SUFFIXES) and ':=' not in words[count]:
+        count += 1
+    return [Path(word) for word in words[:count]], list(words[count:])
+
+
+def _folder_error(folder: str) -> UsageError:
+    systems = [escape(str(path)) for path in list_systems(Path(folder))]
+    shown = [*systems[:_MOST_LISTED], *(['…'] if len(systems) > _MOST_LISTED else [])]
+    listed = '\n'.join(f'  {each}' for each in shown)
+    message = f"'{folder}' is a folder, and a system is one file"
+    return UsageError(message, help=f'it holds\n{listed}' if systems else 'it holds no system')
 
 
 def list_systems(folder: Path) -> list[Path]:

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from composer.cli.common.file_selection import looks_like_system, select_files
+from composer.application.file_selection import looks_like_system, select_files
 
 SYSTEM = 'version: 1\nnodes: {}\n'
 COMPOSE = 'version: "3"\nservices:\n  db:\n    image: x\nnetworks: {}\nvolumes: {}\n'

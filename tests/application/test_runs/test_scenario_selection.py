@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.cli.testing.scenario_selection import (
+from composer.application.test_runs.scenario_selection import (
     SelectedFile,
     check_case_names,
     select_scenarios,

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.system_reader import import_reading, list_files
-from composer.cli.common.told_findings import ToldFindings, with_findings
-from composer.cli.starting.rehearsal import rehearse
-from composer.cli.starting.watched_files import WatchedFiles
+from composer.application.rehearsal import rehearse
+from composer.application.system_reader import import_reading, list_files
+from composer.application.told_findings import ToldFindings, with_findings
+from composer.application.watched_files import WatchedFiles
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
@@ -31,8 +31,8 @@ from composer.runtime.health.system_state import Outcome
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from composer.application.system_reader import SystemReader
     from composer.checks.context import CheckContext
-    from composer.cli.common.system_reader import SystemReader
     from composer.diagnostics import Diagnostic
     from composer.planning.plan import Operation, Plan
     from composer.planning.snapshot import Snapshot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.cli.common.output import show_findings
+from composer.application.output import show_findings
 from composer.diagnostics import has_errors
 from composer.reports.text import render_finding
 

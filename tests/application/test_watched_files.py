@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.cli.starting.watched_files import WatchedFiles
+from composer.application.watched_files import WatchedFiles
 
 DEADLINE_SEC = 20.0
 NEW = 'first line\nsecond line\n'

@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.file_selection import load_given
-from composer.cli.common.output import show_findings
-from composer.cli.common.recording_options import RecordingOptions
-from composer.cli.common.system_reader import SystemReader, import_reading
+from composer.application.output import show_findings
+from composer.application.recording_options import RecordingOptions
+from composer.application.system_reader import SystemReader, import_reading
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
-from composer.language.arguments import describe_arguments
 from composer.language.values.start_reader import StartValueReader
 from composer.network.local_networks import wait_for_network, wait_for_port
 from composer.network.transport_profile import shared_memory_variables
@@ -42,8 +40,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from composer.application.reloader import Reloader
     from composer.checks.context import CheckContext
-    from composer.cli.starting.reload import Reloader
     from composer.diagnostics import Diagnostic
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
@@ -108,7 +106,7 @@ def up(  # noqa: PLR0913 - one for each option
         if context is None or has_errors(told):
             return ExitCode.FAILED
         check_ros()
-        from composer.cli.starting.reload import Reloader
+        from composer.application.reloader import Reloader
 
         if not rehearses:
             wait_for_network(context.spec, lambda text: click.echo(text, err=True))
@@ -228,11 +226,3 @@ def _run(  # noqa: PLR0913 - as above
                 hold=hold,
                 ends_process=ends_process,
             )
-
-
-def describe_file_arguments(paths: Sequence[Path]) -> str:
-    """Return the arguments that a file declares, as `--help` shows them."""
-    system = load_given(paths)
-    if system.spec is None:
-        return 'the file cannot be read'
-    return describe_arguments(system.arguments)

@@ -7,10 +7,10 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.application.file_selection import create_loader
+from composer.application.host_part import find_part
+from composer.application.output import show_findings
 from composer.checks.ignore_comments import IgnoreComments
-from composer.cli.common.file_selection import create_loader
-from composer.cli.common.host_part import find_part
-from composer.cli.common.output import show_findings
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.paths import PathError, resolve_path

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from composer.cli.testing.case_plan import PlannedCase
-    from composer.cli.testing.run_options import RunOptions
+    from composer.application.test_runs.case_plan import PlannedCase
+    from composer.application.test_runs.run_options import RunOptions
     from composer.scenarios.running.case_client import CaseClient
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.application.test_runs.scenario_selection import check_case_names
 from composer.checks.absent_packages import AbsentPackages
-from composer.cli.testing.scenario_selection import check_case_names
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
@@ -16,8 +16,8 @@ from composer.scenarios.scenario_files import load_scenarios
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from composer.cli.testing.name_expressions import Condition
-    from composer.cli.testing.scenario_selection import SelectedFile
+    from composer.application.test_runs.name_expressions import Condition
+    from composer.application.test_runs.scenario_selection import SelectedFile
     from composer.diagnostics import Diagnostic, Span
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from composer.cli.testing.name_expressions import parse_name_expression
+from composer.application.test_runs.name_expressions import parse_name_expression
 from composer.errors import UsageError
 
 NAME = 'tests/robot.scenario.yaml::stops at an obstacle'

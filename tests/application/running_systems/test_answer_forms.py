@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from composer.cli.running.answer_forms import STATUS, TOP, read_answer
+from composer.application.running_systems.answer_forms import STATUS, TOP, read_answer
 from composer.errors import ComposerError
 
 STATUS_ANSWER = {

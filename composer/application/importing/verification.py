@@ -237,7 +237,7 @@ class _Run:
         self._written = folder / kind
         self._written.mkdir()
         self._log = (folder / f'{kind}.log').open('w+', encoding='utf-8')
-        module = 'composer.cli.importing.stand_in_runs'
+        module = 'composer.application.importing.stand_in_runs'
         self._process = subprocess.Popen(  # noqa: S603 - Composer itself
             [sys.executable, '-m', module, kind, str(self._written), site.ends, str(path), *words],
             env=site.environment,

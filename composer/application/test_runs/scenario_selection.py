@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.cli.common.file_selection import match_pattern, walk_yaml_files
+from composer.application.file_selection import match_pattern, walk_yaml_files
 from composer.errors import UsageError
 from composer.records import record
 from composer.spelling import suggest

@@ -1,0 +1,116 @@
+"""Plans: what an edit would do to a running system, or what turns one file into another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from composer import confidential
+from composer.application.file_selection import load_given
+from composer.application.host_part import find_part, take_part
+from composer.checks.checker import check_in_context, create_context
+from composer.diagnostics import has_errors
+from composer.errors import UsageError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.values.start_reader import StartValueReader
+from composer.network.variables import ros_variables
+from composer.planning.differences import compare
+from composer.planning.snapshot_data import conceal_snapshot, decode_snapshot
+from composer.planning.snapshot_taking import take_snapshot
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.planning.plan import Plan
+
+_SNAPSHOT_SEC = 30.0
+
+
+def plan(
+    paths: Sequence[Path],
+    words: Sequence[str] = (),
+    set_values: Sequence[str] = (),
+    *,
+    layers: Sequence[Path] = (),
+    host: str = '',
+) -> tuple[Plan | None, list[Diagnostic]]:
+    """Return what turns one system into another, and what is wrong with them.
+
+    Args:
+        paths: The file of the old system, and that of the new one; one file is that of the new
+            one, and the old one is the running system of its name.
+        words: Values for the arguments that both files declare.
+        set_values: Values to change in both.
+        layers: Files that change both.
+        host: The host whose parts are compared; empty for the whole systems.
+
+    Returns:
+        The plan, `None` if there are errors, and the findings.
+
+    Raises:
+        UsageError: There are more files, or the arguments, the values to set or the host do not
+            fit them.
+        ComposerError: No such system runs.
+    """
+    if len(paths) > 2:  # noqa: PLR2004
+        message = f'a plan compares two files, not {len(paths)}'
+        raise UsageError(message, help='give layers with --layer')
+    contexts: list[CheckContext | None] = []
+    findings: list[Diagnostic] = []
+    hidden: dict[str, str] = {}
+    for path in paths:
+        is_new = path is paths[-1]
+        before = next(filter(None, contexts), None)
+        given = [path, *layers], words, set_values
+        context, found = _read(*given, before, host, checks=is_new)
+        contexts.append(context)
+        # Both may have one, as of a layer.
+        findings += [each for each in found if each not in findings]
+        hidden |= confidential.hidden_values()
+    confidential.hide_again(hidden)
+    if has_errors(findings):
+        return None, findings
+    read = [each for each in contexts if each]
+    if host:
+        # Only the new one must have something there.
+        read = [*(take_part(each, host) for each in read[:-1]), find_part(read[-1], host)]
+    old, *more = read
+    if more:
+        return compare(take_snapshot(old), take_snapshot(more[0])), findings
+    return _compare_with_running(old), findings
+
+
+def _compare_with_running(context: CheckContext) -> Plan:
+    from composer.application.running_systems.answer_forms import read_answer
+    from composer.application.running_systems.client import Client
+    from composer.application.running_systems.discovery import Discovery
+    from composer.runtime.control import protocol
+    from composer.runtime.environment import environment_set
+
+    # They say on which graph it runs.
+    with environment_set(ros_variables(context.spec)), Client() as client:
+        system = Discovery(client).find(context.spec.running_name)
+        answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
+    old = decode_snapshot(read_answer(answer.text))
+    new = take_snapshot(context, [Path(each) for each in old.prefixes])
+    # What was left out of the one is left out of the other.
+    return compare(old, conceal_snapshot(new))
+
+
+def _read(
+    paths: Sequence[Path],
+    words: Sequence[str],
+    set_values: Sequence[str],
+    before: CheckContext | None,
+    host: str,
+    *,
+    checks: bool,
+) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
+    """Return the context of a system, and what was found in it."""
+    before_system = before.system if before else None
+    system = load_given(paths, words, set_values, before_system, StartValueReader(host))
+    context = create_context(system, InterfaceCatalogue(), before)
+    findings = check_in_context(system, context, host=host) if checks else system.diagnostics
+    return context, findings

@@ -1,0 +1,1 @@
+"""Runs of `composer test`: which cases run, and how."""
