@@ -88,19 +88,27 @@ def _create_class(message_class: type, viewed: tuple[str, ...]) -> type:
         '__slots__': (),
         '__module__': message_class.__module__,
         '__doc__': message_class.__doc__,
+        # `type(message)()` is a message of one's own.
+        '__new__': lambda _class, *values, **fields: message_class(*values, **fields),
         '__eq__': compare,
         '__hash__': None,
         '__repr__': lambda message: repr(plain(message)),
         '__reduce_ex__': lambda message, _protocol: (copy, (plain(message),)),
         # Its publishers take this in its place.
         'to_msg': plain,
-        **{name: property(_viewer(f'_{name}')) for name in viewed},
+        **{name: _view(message_class, name) for name in viewed},
     }
     return type(message_class)(message_class.__name__, (message_class,), members)
 
 
-def _viewer(name: str) -> Callable[[Any], memoryview]:
-    return lambda message: memoryview(getattr(message, name)).toreadonly()
+def _view(message_class: type, name: str) -> property:
+    """Return a field that is read as a view, and assigned as ever."""
+    field = f'_{name}'
+
+    def read(message: Any) -> memoryview:
+        return memoryview(getattr(message, field)).toreadonly()
+
+    return property(read, getattr(message_class, name).fset)
 
 
 def _reduce_view(view: memoryview) -> tuple[type, tuple[str, bytes]]:

@@ -106,9 +106,22 @@ def test_sequences_of_numbers_are_protected(message_class, write):
     for message, name in found:
         with pytest.raises((TypeError, ValueError, AttributeError)):
             write(getattr(message, name))
-        with pytest.raises(AttributeError):
-            setattr(message, name, [1])
     assert protected == plain
+
+
+@pytest.mark.parametrize('message_class', SEQUENCES)
+def test_fields_are_assigned_and_messages_made_as_ever(message_class):
+    _plain, protected = make_pair(message_class)
+    made = type(protected)()
+    assert type(made) is message_class
+    for message, name in find_sequences(protected):
+        setattr(message, name, [4, 5])
+        assert getattr(message, name).tolist() == [4, 5]
+        assert type(getattr(message, name)) is memoryview
+        with pytest.raises((AssertionError, TypeError)):
+            setattr(message, name, 'text')
+    for message, name in find_sequences(made):
+        assert type(getattr(message, name)) is array
 
 
 @pytest.mark.parametrize('message_class', [*SEQUENCES, Arrays])
@@ -121,7 +134,6 @@ def test_who_only_reads_sees_no_difference(message_class):
     assert not protected != plain  # noqa: SIM202
     assert protected != String()
     assert isinstance(protected, message_class)
-    assert serialize_message(protected) == serialize_message(plain)
     assert deserialize_message(serialize_message(protected), message_class) == plain
     for (message, name), (other, _) in zip(
         find_sequences(protected), find_sequences(plain), strict=True
@@ -176,7 +188,8 @@ def test_sequences_in_lists_of_messages_are_protected():
     with pytest.raises(TypeError):
         message.unbounded_sequence_of_unbounded_sequences[0].int32_values[0] = 3
     assert message == plain
-    assert serialize_message(message) == serialize_message(plain)
+    # Bytes between fields may differ.
+    assert deserialize_message(serialize_message(message), MultiNested) == plain
     copied = copy.deepcopy(message)
     copied.unbounded_sequence_of_unbounded_sequences[0].int32_values[0] = 3
     assert message == plain
