@@ -49,6 +49,8 @@ MAX_TOKENS_OF_MODULES = 400_000
 MAX_RECORDED_BYTES = 100_000_000
 MAX_SCANNED_BYTES = 200_000_000
 BYTES_OF_RECORDED_VALUE = 100
+# What is built of its definitions: each takes a quarter of a second.
+MAX_RECORDED_TYPES = 500
 
 _YAML = ('.yaml', '.yml')
 _KINDS = {

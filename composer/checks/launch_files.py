@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-import yaml
-
 from composer.ament import find_share
 from composer.input_limits import UnreadableFileError, read_file
 from composer.language.includes.include_entry import shown_path
@@ -17,6 +15,7 @@ from composer.language.paths import PackagePathError, PathError, explain_absent,
 from composer.programs import base_environment, is_on_path, shell_environment
 from composer.records import record
 from composer.spelling import suggest
+from composer.yaml_text.reader import parse_document
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,13 +58,14 @@ def check_launch_files(context: CheckContext) -> Iterator[Diagnostic]:
 def read_launch_arguments(path: Path) -> DeclaredArguments | None:
     """Return the arguments that a launch file declares; `None` if only running it would tell."""
     try:
-        text = read_file(path, _MAX_BYTES).decode()
+        content = read_file(path, _MAX_BYTES)
+        text = content.decode()
         if path.suffix == '.xml':
             return _read_xml(ET.fromstring(text))  # noqa: S314 - a file of the user, as all are
         if path.suffix in ('.yaml', '.yml'):
-            return _read_yaml(yaml.safe_load(text))
+            return _read_yaml(parse_document(content, path.name).data)
         return _read_python(ast.parse(text))
-    except (UnreadableFileError, ValueError, SyntaxError, ET.ParseError, yaml.YAMLError):
+    except (UnreadableFileError, ValueError, SyntaxError, ET.ParseError):
         return None
     except RecursionError:
         return None

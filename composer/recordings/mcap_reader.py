@@ -42,6 +42,8 @@ _MOST_HELD: Final = 4 * MAX_RECORDED_BYTES
 # The year 2262; ROS has no later time.
 _LAST_NS: Final = 2**63 - 1
 _MAGIC: Final = b'\x89MCAP0\r\n'
+# What follows the kind of a record.
+_LENGTH_BYTES: Final = 8
 
 
 @record
@@ -99,7 +101,13 @@ class _Counted(io.BufferedIOBase):
     def read(self, size: int | None = None, /) -> bytes:
         size = -1 if size is None else size
         self._budget.spend(size)
-        return self._stream.read(size)
+        data = self._stream.read(size)
+        if data == b'\0':
+            rest = self._stream.read(_LENGTH_BYTES)
+            self._stream.seek(-len(rest), io.SEEK_CUR)
+            # No record is of this kind: a file system fills what was lost with zeros.
+            return data if any(rest) else b''
+        return data
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
         return self._stream.seek(offset, whence)
@@ -143,9 +151,9 @@ def _scan(path: Path, stream: IO[bytes], budget: Budget) -> FileContent:
     problems: list[str] = []
     for each in _stream_records(path, stream, problems, budget):
         if isinstance(each, Channel):
-            channels[each.id] = each
+            channels.setdefault(each.id, each)
         elif isinstance(each, Schema):
-            schemas[each.id] = each
+            schemas.setdefault(each.id, each)
         elif isinstance(each, Message):
             counts[each.channel_id] += 1
             start_ns = min(start_ns or each.log_time, each.log_time)
@@ -282,9 +290,9 @@ def _iterate_unindexed(
     schemas: dict[int, Schema] = {}
     for each in _stream_records(path, stream, [], Budget()):
         if isinstance(each, Channel):
-            channels[each.id] = each
+            channels.setdefault(each.id, each)
         elif isinstance(each, Schema):
-            schemas[each.id] = each
+            schemas.setdefault(each.id, each)
         elif isinstance(each, Message) and each.log_time >= since_ns:
             channel = channels[each.channel_id]
             if channel.topic in wanted:

@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import yaml
 
+from composer.diagnostics import SourceFile
+from composer.yaml_text.plain_data import construct_data
+from composer.yaml_text.positions import SourceMap
+from composer.yaml_text.tree import CompositionError, compose_tree
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
@@ -67,17 +72,29 @@ def write_qos(policies: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def parse_text(text: str) -> Any:
+    """Return the data of a YAML text, with no more than a system may have.
+
+    Raises:
+        ValueError: It is not YAML, or has more.
+    """
+    source = SourceFile('', tuple(text.splitlines()))
+    try:
+        data, _ = construct_data(compose_tree(text, source), SourceMap(source))
+    except CompositionError as error:
+        raise ValueError(error.diagnostic.message) from error
+    return data
+
+
 def read_qos(profiles: str) -> list[dict[str, Any]]:
     """Return the QoS of publishers from what rosbag2 of any version wrote, as for `write_qos`.
 
     What is no such text is of no publisher.
     """
     try:
-        found = yaml.safe_load(profiles if len(profiles) <= _LONGEST_QOS else '') or []
+        found = parse_text(profiles if len(profiles) <= _LONGEST_QOS else '') or []
         return [_read_profile(each) for each in found]
-    except (yaml.YAMLError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        return []
-    except RecursionError:  # lists in lists
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         return []
 
 

@@ -130,18 +130,16 @@ def _list_files(path: Path) -> list[Path]:
 
 def _named_files(folder: Path) -> list[str]:
     """Return the files that the `metadata.yaml` of a folder names; none if it has none."""
-    import yaml
-
     path = folder / metadata.FILE_NAME
     if not os.path.lexists(path):
         return []
     try:
         text = read_file(path, _LARGEST_METADATA).decode()
-        named = yaml.safe_load(text)[metadata.ROOT]['relative_file_paths']
-        return [str(each) for each in named]
+        named = metadata.parse_text(text)[metadata.ROOT]['relative_file_paths']
+        return [*dict.fromkeys(map(str, named))]
     except UnreadableFileError as error:
         message = f"'{path}': {error}"
         raise RecordingError(message, help='name the MCAP file itself') from error
-    except (yaml.YAMLError, LookupError, TypeError, ValueError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError) as error:
         message = f"'{path}' cannot be read: {error}"
         raise RecordingError(message, help='name the MCAP file itself') from error

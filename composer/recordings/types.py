@@ -12,7 +12,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.errors import ComposerError
-from composer.input_limits import MAX_BYTES_OF_DEFINITIONS, format_size
+from composer.input_limits import MAX_BYTES_OF_DEFINITIONS, MAX_RECORDED_TYPES, format_size
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.classes import InterfaceNotFoundError, import_interface
 from composer.recordings.definitions import full_definition, import_message, type_hash
@@ -160,6 +160,13 @@ def _build_missing(
                 missing.setdefault(package, {})[short] = text
     if not missing or _can_import(missing):
         return None
+    count = sum(map(len, missing.values()))
+    if count > MAX_RECORDED_TYPES:
+        message = (
+            f'{count:,} recorded types are not installed, and {MAX_RECORDED_TYPES} are built at '
+            'most: install their packages, or name fewer topics'
+        )
+        return RecordingError(message)
     # They are imported only where something must be built.
     from composer.interfaces.build.provision import import_packages, provide_packages
     from composer.interfaces.definitions.packages import load_packages

@@ -931,3 +931,10 @@ def nested_nodl(folder):
     nodl = '<interface version="1"><node name="n" executable="e">' + '<x>' * (2_000_000 // DIVISOR)
     write(folder, nodl, 'n.nodl.xml')
     write(folder, f'{HEAD}processes: {{p: {{command: [sh], nodl: n.nodl.xml}}}}\n')
+
+
+@case()
+def launch_file_of_merges(folder):
+    levels = (f'a{i}: &a{i} {{<<: [{", ".join([f"*a{i - 1}"] * 10)}]}}\n' for i in range(1, 9))
+    write(folder, f'launch: []\na0: &a0 {{x: 1}}\n{"".join(levels)}', 'l.yaml')
+    write(folder, f'{HEAD}processes: {{p: {{launch: l.yaml}}}}\n')

@@ -155,6 +155,39 @@ def many_topics(path):
     write_topics(path, [f'/t{each}' for each in range(60_000)])
 
 
+@case('5,000 recorded types are not installed, and 500 are built at most')
+def many_types(path):
+    parts = ''.join(f'{"=" * 80}\nMSG: odd_msgs/T{each}\nstring data\n' for each in range(4999))
+    write_topics(path, kind='odd_msgs/msg/Odd', text=f'string data\n{parts}')
+
+
+@case('has nothing to publish')
+def zeros(path):
+    path.write_bytes(MAGIC)
+    os.truncate(path, 300_000_000)
+
+
+def write_folder(path, metadata):
+    path.mkdir()
+    write_topics(path / 'a.mcap')
+    (path / 'metadata.yaml').write_text(metadata)
+
+
+@case('more than')
+def endless_aliases(path):
+    levels = ''.join(f'a{i}: &a{i} [{", ".join([f"*a{i - 1}"] * 10)}]\n' for i in range(1, 10))
+    text = f'a0: &a0 [x]\n{levels}rosbag2_bagfile_information: {{relative_file_paths: *a9}}\n'
+    write_folder(path, text)
+
+
+@case('more than')
+def endless_merges(path):
+    levels = ''.join(
+        f'a{i}: &a{i} {{<<: [{", ".join([f"*a{i - 1}"] * 10)}]}}\n' for i in range(1, 9)
+    )
+    write_folder(path, f'a0: &a0 {{x: 1}}\n{levels}')
+
+
 SCENARIO = """\
 version: 1
 system: {file: system.yaml}
