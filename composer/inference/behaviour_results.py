@@ -25,7 +25,7 @@ from composer.inference.values import (
     join,
 )
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.return_values import may_return_nothing
+from composer.python_source.return_values import may_return_nothing, never_returns
 
 if TYPE_CHECKING:
     from composer.inference.evaluation.evaluator import Evaluator
@@ -83,7 +83,17 @@ def _check_ways(
         for value, place in scope.returned
         if isinstance(place.node, ast.Call) and any(map(is_none, alternatives(value)))
     ]
-    if not isinstance(definition, ast.Lambda) and may_return_nothing(definition):
+
+    def is_last(call: ast.Call) -> bool:
+        with evaluator.run.silence():
+            called = evaluator.evaluate(call.func, scope)
+        return (
+            isinstance(called, Function)
+            and not isinstance(called.definition, ast.Lambda)
+            and never_returns(called.definition)
+        )
+
+    if not isinstance(definition, ast.Lambda) and may_return_nothing(definition, is_last):
         doubtful.append(Place(callee.module, definition))
     for place in certain:
         evaluator.payloads.check(returned, NONE, place)

@@ -41,6 +41,7 @@ class Scope:
         doubtful: The expressions that it returns where only the file decides, by their nodes.
         stored: What its names stood for anywhere.
         is_body: Whether it is the body of a class.
+        version: How often a name came to stand for something else.
     """
 
     module: ModuleSource
@@ -59,6 +60,7 @@ class Scope:
     doubtful: set[int] = field(default_factory=set)
     stored: Names = field(default_factory=dict)
     is_body: bool = False
+    version: int = 0
 
     def set(self, name: str, value: Value) -> None:
         """Store what a name stands for from now on."""
@@ -66,11 +68,16 @@ class Scope:
             value = UNKNOWN if name in self.unsure else value
             self.names[name] = value
             before = self.stored.get(name)
+            self.version += before != value
             self.stored[name] = value if before is None else join([before, value])
 
     def latest(self, name: str) -> Value | None:
         """Return what was stored in a name last, for a function that is called later."""
         return self.stored.get(name)
+
+    def all_versions(self) -> int:
+        """Return how often a name here, or around, came to stand for something else."""
+        return self.version + (self.outer.all_versions() if self.outer else 0)
 
     def all_names(self) -> Iterator[str]:
         """Yield the names of this scope and those around it."""

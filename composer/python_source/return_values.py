@@ -9,7 +9,7 @@ from composer.python_source.annotations import dotted_name
 from composer.python_source.local_names import stored_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from composer.python_source.syntax import FunctionNode
 
@@ -87,31 +87,48 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
     return isinstance(answer, _VALUES) or (isinstance(answer, ast.Name) and answer.id in sure)
 
 
-def may_return_nothing(function: FunctionNode) -> bool:
-    """Return whether some paths through a function return a value, and others nothing."""
+def may_return_nothing(function: FunctionNode, is_last: Callable[[ast.Call], bool]) -> bool:
+    """Return whether some paths through a function return a value, and others nothing.
+
+    Args:
+        is_last: Whether a call never returns.
+    """
     answers = [each.value for each in _returns(function)]
     bare = [each for each in answers if each is None]
-    return len(bare) < len(answers) and bool(bare or not _ends(function.body))
+    return len(bare) < len(answers) and bool(bare or not _ends(function.body, is_last))
 
 
-def _ends(body: list[ast.stmt]) -> bool:
+def never_returns(function: FunctionNode) -> bool:
+    """Return whether a function always raises, or is said to."""
+    said = dotted_name(function.returns) if function.returns is not None else ''
+    if str(said).rpartition('.')[2] in ('NoReturn', 'Never'):
+        return True
+    return not any(_returns(function)) and _ends(function.body)
+
+
+def _is_exit(call: ast.Call) -> bool:
+    return dotted_name(call.func) in _WITHOUT_RETURN
+
+
+def _ends(body: list[ast.stmt], is_last: Callable[[ast.Call], bool] = _is_exit) -> bool:
     """Return whether no path through a block comes to its end: all return or raise."""
     last = body[-1] if body else None
     match last:
         case ast.Return() | ast.Raise() | ast.Continue():
             return True
         case ast.Expr(value=ast.Call() as call):
-            return dotted_name(call.func) in _WITHOUT_RETURN
+            return _is_exit(call) or is_last(call)
         case ast.If(body=body, orelse=orelse):
-            return _ends(body) and _ends(orelse)
+            return _ends(body, is_last) and _ends(orelse, is_last)
         case ast.With() | ast.AsyncWith():
-            return _ends(last.body)
+            return _ends(last.body, is_last)
         case ast.Try(body=body, orelse=orelse, finalbody=final, handlers=handlers):
             blocks = [orelse or body, *(each.body for each in handlers)]
-            return bool(final and _ends(final)) or all(map(_ends, blocks))
+            ended = [_ends(each, is_last) for each in (*blocks, final)]
+            return ended.pop() or all(ended)
         case ast.Match(cases=cases):
             is_whole = cases[-1].guard is None and _takes_all(cases[-1].pattern)
-            return is_whole and all(_ends(each.body) for each in cases)
+            return is_whole and all(_ends(each.body, is_last) for each in cases)
         case ast.While(test=ast.Constant(value=value)):
             inner = [node for node in ast.walk(last) if isinstance(node, ast.Break)]
             return bool(value) and not inner

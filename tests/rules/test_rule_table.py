@@ -29,6 +29,7 @@ SPEAKING = (
     'inference',
     'checks',
     'scenarios',
+    'application',
     'cli',
 )
 SPEAKING_FILES = ('entity_kinds.py', 'runtime/behaviours/import_check.py')

@@ -34,6 +34,7 @@ from composer.inference.values import (
 from composer.python_source.changed_names import changed_in
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource, read_signature
+from composer.python_source.return_values import never_returns
 
 # How deep helpers of helpers are followed.
 _DEEPEST = 12
@@ -205,7 +206,9 @@ class Functions(Part):
         owner: object = function.owner
         if isinstance(owner, Instance):
             owner = (id(owner), owner.version)
-        made = (id(function.definition), id(function.outer), *function.defaults.values())
+        # What is around it may have changed since the last call.
+        around = function.outer.all_versions() if function.outer is not None else 0
+        made = (id(function.definition), id(function.outer), around, *function.defaults.values())
         return (made, owner, names, at, *values)
 
     def enter(self, function: Function, arguments: Arguments, *, waits: bool) -> Scope:
@@ -311,7 +314,9 @@ class Functions(Part):
 def result_of(kind: FunctionKind, scope: Scope) -> Value:
     """Return what a call gave, from the scope of the function at its end."""
     returned = join([value for value, _ in scope.returned]) if scope.returned else NONE
-    if kind is FunctionKind.PLAIN and not scope.returned:
+    definition = scope.function.definition if scope.function else None
+    is_said = isinstance(definition, ast.FunctionDef) and never_returns(definition)
+    if kind is FunctionKind.PLAIN and (is_said or not scope.returned):
         return NEVER
     if kind is FunctionKind.COROUTINE:
         return Awaitable(returned)

@@ -678,6 +678,9 @@ ANSWERED = (
     f'try: x = open("x")\n    except OSError: raise\n    else: {GIVES}',
     f'with open("x"): {GIVES}',
     f'if request.data: {GIVES}\n    else: {GIVES}',
+    f'if request.data: {GIVES}\n    fail()\n\ndef fail(): raise ValueError',
+    f'if request.data: {GIVES}\n    fail()\n\nimport typing\ndef fail() -> typing.NoReturn: print()',
+    f'try: {GIVES}\n    except OSError: fail()\n\nimport sys\ndef fail(): sys.exit(1)',
 )
 
 

@@ -34,6 +34,7 @@ IN_FUNCTION = {
     'a partial of a partial': 'l = []\np = functools.partial(functools.partial(list.append, l))\nvendor.run(p)\nif not l: return',
     'map': 'l = []\nlist(map(l.append, m.header.frame_id))\nif not l: return',
     'map of known items': "l = []\ndeque(map(l.append, 'ab'), maxlen=0)\nif not l: return",
+    'iter until a value': 'l = []\nfor x in iter(lambda: l.append(1), None): break\nif not l: return',
     'heappush': 'l = []\nheapq.heappush(l, 1)\nif not l: return',
     'insort': 'l = []\nbisect.insort(l, 1)\nif not l: return',
     'setitem': "d = {}\noperator.setitem(d, 'a', 1)\nif not d: return",

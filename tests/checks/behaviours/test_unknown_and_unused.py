@@ -36,6 +36,14 @@ def test_a_name_that_the_node_does_not_declare_is_a_finding(check, line):
     assert check(NODE, run(USES_ALL, line)) == [(3, 'unknown-publisher')]
 
 
+def test_a_lambda_in_a_loop_uses_each_name(check):
+    system = NODE.replace('    publishers: {', '    publishers: {in: std_msgs/msg/String, ')
+    lines = ('print(node.parameters.speed)', 'for each in ("in", "out"):')
+    code = run(*lines, '    later(lambda: node.publish(each, "hello"), each)')
+    found = check(system, code + '\ndef later(call, name):\n    print(name, call())\n')
+    assert 'unused-publisher' not in [rule for _, rule in found]
+
+
 @pytest.mark.parametrize(
     'line',
     [

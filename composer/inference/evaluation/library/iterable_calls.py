@@ -228,6 +228,9 @@ class IterableCalls(Part):
     # Items in another form
 
     def _iterate(self, arguments: Arguments, _: Place) -> Value:
+        if len(arguments.positional) > 1:
+            # `iter` calls the first, and `islice` takes numbers.
+            self._evaluator.calls.escape_all(arguments)
         return Generated(self._item(arguments.get(0, '')), NONE)
 
     def _list(self, kind: type, arguments: Arguments, place: Place) -> Value:
