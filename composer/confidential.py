@@ -1,4 +1,4 @@
-"""What findings do not show: values of environment variables, and lines of files of others.
+"""What findings do not show: values that are read at the start, and lines of files of others.
 
 In CI, who changes a file sees what a check of it reports, and should not see the variables and
 files of the machine with it. What this promises, and what not, is in `docs/checking.md`.
@@ -23,6 +23,8 @@ PROJECT_MARKS = ('pyproject.toml', '.git')
 _WORD = re.compile(r'\w+')
 # What stands in quotes, with what is left out of it where it is long; or a word.
 _QUOTED_OR_WORD = re.compile(r"'([^']*)'|\w+")
+# Of a longer text, as a description of a robot, no words are hidden but those of variables.
+_LONGEST_OF_WORDS = 1000
 # They tell no more than a comparison does.
 _COMMON = frozenset(('true', 'false', 'null', 'none', ''))
 
@@ -77,7 +79,9 @@ def hide(value: Any, origin: str, written: str = '') -> None:
             hide(each, origin, written)
     elif value is not None and not isinstance(value, bool):
         text = str(value).lower()
-        words = {text, *_WORD.findall(text)} - {*_WORD.findall(written.lower())} - _COMMON
+        has_words = len(text) <= _LONGEST_OF_WORDS or origin.startswith('env(')
+        words = {text, *_WORD.findall(text if has_words else '')}
+        words -= {*_WORD.findall(written.lower())} | _COMMON
         _origins.update((word, origin) for word in words if word not in _origins)
 
 

@@ -15,7 +15,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.values.start_reader import StartValueReader
 from composer.network.variables import ros_variables
 from composer.planning.differences import compare
-from composer.planning.snapshot_data import conceal_snapshot, decode_snapshot
+from composer.planning.snapshot_data import conceal_both, decode_snapshot
 from composer.planning.snapshot_taking import take_snapshot
 
 if TYPE_CHECKING:
@@ -93,10 +93,9 @@ def _compare_with_running(context: CheckContext) -> Plan:
     with environment_set(ros_variables(context.spec)), Client() as client:
         system = Discovery(client).find(context.spec.running_name)
         answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
-    old = decode_snapshot(read_answer(answer.text))
-    new = take_snapshot(context, [Path(each) for each in old.prefixes])
-    # What was left out of the one is left out of the other.
-    return compare(old, conceal_snapshot(new))
+    prefixes = decode_snapshot(read_answer(answer.text)).prefixes
+    new = take_snapshot(context, [Path(each) for each in prefixes])
+    return compare(*conceal_both(answer.text, new))
 
 
 def _read(

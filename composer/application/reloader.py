@@ -17,6 +17,7 @@ from composer.application.rehearsal import rehearse
 from composer.application.system_reader import import_reading, list_files
 from composer.application.told_findings import ToldFindings, with_findings
 from composer.application.watched_files import WatchedFiles
+from composer.confidential import conceal
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
@@ -100,7 +101,8 @@ class Reloader:
             try:
                 plan = self._rewire(system, findings, is_whole)
             except ComposerError as error:
-                return self._note_failure(system, findings, f'not reloaded: {error}')
+                text = conceal(f'not reloaded: {error}')
+                return self._note_failure(system, findings, text)
             return self._note_success(system, findings, plan, monotonic() - begun)
 
     def _note_failure(self, system: System, findings: list[Diagnostic], text: str) -> Outcome:
@@ -147,7 +149,7 @@ class Reloader:
                 context = self._check(findings)
                 new = take_snapshot(context, self._prefixes)
             except ComposerError as error:
-                return Outcome(succeeded=False, text=with_findings(findings, str(error)))
+                return Outcome(succeeded=False, text=with_findings(findings, conceal(str(error))))
             # Who asks may be anybody on the ROS graph.
             plan = compare(conceal_snapshot(system.snapshot), conceal_snapshot(new))
             text = render_plan(plan).rstrip('\n')

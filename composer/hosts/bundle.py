@@ -20,7 +20,7 @@ from composer.hosts.wheels import build_composer_wheel
 from composer.network.servers import used_hosts
 from composer.network.variables import ros_variables
 from composer.planning.differences import keep_start
-from composer.planning.snapshot_data import encode_snapshot
+from composer.planning.snapshot_data import KEY_OF_ALL, encode_snapshot
 from composer.planning.snapshot_taking import take_snapshot
 from composer.spelling import suggest
 
@@ -97,7 +97,7 @@ class Bundle:
             required=provide_wheels(pin(required, target), target),
             composer=self._composer,
             variables=ros_variables(spec),
-            start=encode_snapshot(keep_start(snapshot)),
+            start=encode_snapshot(keep_start(snapshot), KEY_OF_ALL),
             hosts=choose_hosts(self._context.spec),
             read=self._read,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class Snapshot:
         set_live: The parameters that somebody has set while the system ran, by the nodes' full
             names; `None` if it does not run.
         read_at_start: Where values are written that are read from files and of commands.
+        hidden: What `composer.confidential` hides of the system.
     """
 
     spec: SystemSpec
@@ -44,6 +45,7 @@ class Snapshot:
     generators: Collection[str] = frozenset()
     set_live: Mapping[str, Collection[str]] | None = None
     read_at_start: Collection[Span] = frozenset()
+    hidden: Mapping[str, str] = field(default_factory=dict)
 
     def is_read_at_start(self, path: DataPath) -> bool:
         """Return whether the value at a path is read when the system starts."""

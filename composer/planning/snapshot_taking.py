@@ -6,6 +6,7 @@ import ast
 import hashlib
 from typing import TYPE_CHECKING
 
+from composer.confidential import hidden_values
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import system_bindings
 from composer.language.parameter_files import read_given_file
@@ -51,6 +52,7 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         tuple(map(str, prefixes)),
         frozenset(_find_generators(context)),
         read_at_start=frozenset(each.span for each in context.system.start.found),
+        hidden=hidden_values(),
     )
 
 

@@ -192,7 +192,7 @@ def _without_values(variables: dict[str, Any]) -> dict[str, Any]:
 
 def _hidden(value: Any) -> Any:
     origin = origin_of(value)
-    if origin is None:
+    if origin is None or not origin.startswith('env('):
         return value
     name = origin.partition('"')[2].rpartition('"')[0]
     if os.environ.get(name) != value:

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from composer.confidential import hide
 from composer.errors import ComposerError
 from composer.input_limits import MAX_FILE_BYTES, explain_missing
 from composer.language.paths import PathError, resolve_path
@@ -59,7 +60,9 @@ class StartValueReader:
         if value.is_elsewhere(self._host):
             return value.sample
         try:
-            return _converted(value, self._find(value))
+            found = self._find(value)
+            hide(found, value.origin)
+            return _converted(value, found)
         except ComposerError as error:
             message = f'{value.span}: {value.name}: {error}'
             raise StartValueError(message, help=error.help) from error

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.confidential import hide
 from composer.errors import StartError
 from composer.records import record
 
@@ -72,6 +73,11 @@ class StartValue:
         return [item] if type_name.endswith('_array') else item
 
     @property
+    def origin(self) -> str:
+        """Where it is written, in words."""
+        return f'the {"command" if self.command else "file"} of {self.span.place}'
+
+    @property
     def named_files(self) -> list[Path]:
         """The files that it names: a change of one may change the value."""
         if self.command:
@@ -104,7 +110,11 @@ class StartValues:
     def value_of(self, value: StartValue) -> tuple[Any, bool]:
         """Return a value, or its sample, and whether it is a sample."""
         self.found.append(value)
-        return (value.sample, True) if self.read is None else (self.read(value), False)
+        if self.read is None:
+            return value.sample, True
+        read = self.read(value)
+        hide(read, value.origin)
+        return read, False
 
 
 def parse_start_value(

@@ -14,8 +14,14 @@ from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.language.values.start_reader import StartValueReader
+from composer.planning import snapshot_data
 from composer.planning.differences import compare
-from composer.planning.snapshot_data import conceal_snapshot, decode_snapshot, encode_snapshot
+from composer.planning.snapshot_data import (
+    conceal_both,
+    conceal_snapshot,
+    decode_snapshot,
+    encode_snapshot,
+)
 from composer.planning.snapshot_taking import take_snapshot
 from composer.planning.text import render_plan
 from tests.running import ROOT
@@ -100,19 +106,30 @@ def test_files_are_compared_with_the_running_system(compose, capsys, monkeypatch
 SECRETS = """\
 version: 1
 environment: {TOKEN: s3cr3t-1, PIN: {file: pin.txt}}
+args:
+  pin: {file: pin.txt}
+  code: {command: [cat, pin.txt]}
+  token: {default: "{{ env('COMPOSER_SECRET') }}"}
+vars: {head: "Bearer {{ pin }}"}
 nodes:
   n:
+    state: {pin: "{{ pin }}", more: [{other: "{{ token }}"}]}
     parameters:
       a: {file: pin.txt}
       b: {file: pin.txt, description: a pin}
+      c: "{{ head }}"
+      d: "{{ code[:8] }}"
+      e: "{{ token | upper }}"
 processes:
   p: {command: [sh], env: {TOKEN: s3cr3t-2, OTHER: {command: [cat, pin.txt]}}}
+  o: {command: [sh, -c, "echo {{ head }}", "--pin={{ code }}"], cwd: "{{ token }}"}
   q: {package: demo_nodes_cpp, executable: talker, parameters: {c: {file: pin.txt}}}
 """
 
 
 def test_a_snapshot_tells_that_secrets_change_but_not_what_they_are(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('COMPOSER_SECRET', 's3cr3t-6')
 
     def snapshot_with(pin, text):
         Path('pin.txt').write_text(pin)
@@ -124,7 +141,9 @@ def test_a_snapshot_tells_that_secrets_change_but_not_what_they_are(tmp_path, mo
     same = conceal_snapshot(snapshot_with('s3cr3t-3', SECRETS))
     new = snapshot_with('s3cr3t-4', SECRETS.replace('s3cr3t-2', 's3cr3t-5'))
 
-    assert 's3cr3t' not in json.dumps([encode_snapshot(old), encode_snapshot(new)])
+    sent = json.dumps(encode_snapshot(old))
+    for text in (sent, json.dumps(encode_snapshot(new))):
+        assert 's3cr3t' not in text.lower()
     assert not compare(conceal_snapshot(old), same)
     plan = compare(conceal_snapshot(old), conceal_snapshot(new))
     assert 's3cr3t' not in render_plan(plan)
@@ -133,7 +152,26 @@ def test_a_snapshot_tells_that_secrets_change_but_not_what_they_are(tmp_path, mo
         ('a', 'environment.PIN'),
         ('a', 'default'),
         ('b', 'default'),
+        ('c', 'default'),
+        ('d', 'default'),
+        ('n', 'state.pin'),
+        ('o', 'command'),
         ('p', 'env.TOKEN'),
         ('p', 'env.OTHER'),
         ('q', 'parameters.c'),
     }
+    before, after = conceal_both(sent, new)
+    assert render_plan(compare(before, after)) == render_plan(plan)
+    monkeypatch.setattr(snapshot_data, 'user_key', lambda: b'of another user')
+    assert sent != json.dumps(encode_snapshot(old))
+    assert not compare(*conceal_both(sent, new))
+
+
+def test_the_key_of_a_user_is_made_once_and_is_not_for_others(tmp_path, monkeypatch):
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
+    keys = {snapshot_data.user_key.__wrapped__() for _ in range(2)}
+    assert [len(each) for each in keys] == [32]
+    (path,) = (tmp_path / 'composer').iterdir()
+    assert path.stat().st_mode & 0o777 == 0o600
+    monkeypatch.setenv('XDG_STATE_HOME', '/dev/null')
+    assert snapshot_data.user_key.__wrapped__() not in keys
