@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run
+from tests.cli.test_streams import end_without_reader
 from tests.running import DEADLINE_SEC, ROOT, Child
 
 pytestmark = pytest.mark.ros
@@ -75,6 +76,8 @@ def test_the_terminal_comes_back_when_all_is_up(compose, detached, capfd):
     assert 'logged hi' in text
     follower = Child(['logs', '-f', 'system'], compose.folder, compose.domain_id, compose.folder)
     follower.wait_for_line('logged hi')
+    domain = {'ROS_DOMAIN_ID': str(compose.domain_id)}
+    assert end_without_reader(['logs', '-f', 'system'], compose.folder, **domain) == 0
     code, output = detached(str(path))
     assert code == 1
     assert "error: a system 'system' runs already on this ROS graph" in output
