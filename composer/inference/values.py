@@ -44,9 +44,11 @@ class Unknown:
             for what goes either way while the system runs, whatever the file says: a message's
             number that is compared with a parameter.
         is_read_only: Whether it is a view of an array in a message that others have, too.
+        is_ros: Whether it is `node.ros`.
     """
 
     is_chosen: int = 0
+    is_ros: bool = field(default=False, kw_only=True)
     is_read_only: bool = field(default=False, kw_only=True)
 
 

@@ -25,7 +25,9 @@ def check(tmp_path, monkeypatch):
         catalogue = InterfaceCatalogue() if installed else InterfaceCatalogue(prefixes=[])
         findings = check_system(load_system(path), catalogue)
         if rule is None:
-            return [(finding.span.line, finding.rule) for finding in findings]
+            # Systems of a table have state for all its rows.
+            kept = [finding for finding in findings if finding.rule != 'unused-state']
+            return [(finding.span.line, finding.rule) for finding in kept]
         return [getattr(finding, tells) for finding in findings if finding.rule == rule]
 
     return run

@@ -209,7 +209,22 @@ def _check_unused(
                     used.add(span)
                 elif span not in unused:
                     unused[span] = _explain_unused(context, kind, name, entity.path)
+        touched = mentioned.union(*map(_state_names, uses))
+        is_open = not uses or any(each.is_state_open for each in uses)
+        for name in node.state:
+            path = (*node.path, 'state', name)
+            span = context.system.positions.key(path)
+            if is_open or name in touched:
+                used.add(span)
+            elif span not in unused:
+                text = f"'{name}' is declared in the state, and no behaviour of the node uses it"
+                unused[span] = context.at_key(path, 'unused-state', text, help='remove it')
     yield from (finding for span, finding in unused.items() if span not in used)
+
+
+def _state_names(reading: Reading) -> set[str]:
+    """Return the names of `node.state` that a behaviour uses."""
+    return {*reading.state_set, *reading.state_tested, *(each.name for each in reading.state_read)}
 
 
 def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, str]]:

@@ -50,6 +50,22 @@ class MadeFields(Part):
             for each in self._evaluator.classes.bodies.line_of(of)
         )
 
+    def is_frozen(self, of: Class, name: str) -> bool:
+        """Return whether a name is a field that cannot be stored in."""
+        makers = [
+            each
+            for base in self._evaluator.classes.bodies.line_of(of)
+            if isinstance(base, Class)
+            for each in base.definition.decorator_list
+        ]
+        frozen = any(
+            isinstance(each, ast.Call)
+            and any(getattr(word.value, 'value', False) is True for word in each.keywords)
+            for each in makers
+        )
+        is_record = frozen and self._is_dataclass(of)
+        return (is_record or self.is_tuple(of)) and name in self._fields(of)
+
     def _decorators(self, of: Class) -> set[str]:
         found = set()
         for each in of.definition.decorator_list:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+from array import array
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.inference.classes.project_classes import CLASS_NAMES
@@ -12,6 +14,7 @@ from composer.inference.evaluation.library.known_functions import MAPPINGS
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.read_only_writes import VIEWING, WRITING
 from composer.inference.message_types import PARTS, in_python, value_of
+from composer.inference.ros_members import ros_members
 from composer.inference.values import (
     BY_PARAMETER,
     CHOSEN,
@@ -102,6 +105,8 @@ _SHOWN_PARTS = {
     'own_state': 'own_state',
     'changes': 'the changes',
 }
+# What a sequence of numbers, or of texts, may be.
+_ARRAYS = (list, array, memoryview)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 
 
@@ -185,6 +190,10 @@ class Attributes(Part):
                 return found or (External(f'builtins.object.{name}') if is_plain else UNKNOWN)
             case ArrayField():
                 return self._read_array(owner, name)
+            case Unknown(is_ros=True) if name[0] != '_' and ros_members():
+                if name not in ros_members():
+                    return _missing('node.ros', name, ros_members())
+                return CHOSEN if ros_members()[name] is None else BoundMethod(owner, name)
             case Unknown(is_read_only=True) if name in WRITING or name in VIEWING:
                 return BoundMethod(owner, name)
             case Primitive():
@@ -207,7 +216,7 @@ class Attributes(Part):
         if name == 'ros':
             self._evaluator.run.reading.reaches_ros = True
             self._evaluator.run.reading.open_kinds.add('parameter')
-            return CHOSEN
+            return replace(CHOSEN, is_ros=True)
         if name in NODE_ATTRIBUTES:
             return PartOfNode(name)
         if name in NODE_METHODS:
@@ -286,6 +295,10 @@ class Attributes(Part):
         nested = owner.type.nested
         if nested is None and owner.is_made and name not in SAME:
             return UNKNOWN
+        is_known = owner.type.array == 'fixed' or any(hasattr(each, name) for each in _ARRAYS)
+        if nested is None and not is_known:
+            help_text = suggest(name, [each for each in dir(array) if each[0] != '_'])
+            return 'unknown-attribute', f"an array of numbers has no '{name}'", help_text
         if nested is None or hasattr(list, name):
             return BoundMethod(owner, name)
         message = f"'{name}' is read of an array of {nested}"
@@ -419,6 +432,9 @@ class Attributes(Part):
                 run.report('unknown-attribute', place, message, f'keep it in node.state.{name}')
             case Message():
                 self._store_field(owner, name, value, place)
+            case Instance() if self._evaluator.classes.fields.is_frozen(owner.of, name):
+                message = f"'{name}' cannot be set: {owner.of.definition.name} is frozen"
+                run.report('unknown-attribute', place, message, 'make another one')
             case Instance():
                 if owner.is_open:
                     self._evaluator.escape(value)

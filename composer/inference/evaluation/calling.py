@@ -15,7 +15,9 @@ from composer.inference.evaluation.signatures import (
 )
 from composer.inference.message_types import in_python
 from composer.inference.reading import SENDING_METHODS
+from composer.inference.ros_members import ros_members
 from composer.inference.values import (
+    CHOSEN,
     NODE,
     UNKNOWN,
     Argument,
@@ -48,6 +50,8 @@ from composer.inference.values import (
 from composer.interfaces.field_errors import unknown_field
 
 if TYPE_CHECKING:
+    import inspect
+
     from composer.inference.scopes import Scope
 
 # Methods that call a function with the arguments after it, and the position of the function.
@@ -207,6 +211,11 @@ class Calls(Part):
                 return self._evaluator.node_calls.call(
                     name, arguments, waits=waits, is_awaited=is_awaited
                 )
+            case BoundMethod(owner=Unknown(is_ros=True), name=name):
+                self._fits_signature(name, ros_members()[name], arguments, place)
+                self._evaluator.run.moves += 1
+                self.escape_all(arguments)
+                return PartOfNode('logger') if name == 'get_logger' else CHOSEN
             case BoundMethod(owner=Class() as owner):
                 return self._evaluator.classes.subclasses(owner)
             case BoundMethod():
@@ -265,7 +274,11 @@ class Calls(Part):
 
     def _fits(self, owner: str, name: str, arguments: Arguments, place: Place) -> bool:
         """Return whether a method can be called so; report it if not."""
-        signature = signature_of(owner, name)
+        return self._fits_signature(name, signature_of(owner, name), arguments, place)
+
+    def _fits_signature(
+        self, name: str, signature: inspect.Signature | None, arguments: Arguments, place: Place
+    ) -> bool:
         misfit = explain_misfit(signature, arguments) if signature else None
         if misfit is None:
             for argument, problem in wrong_types(signature, arguments) if signature else ():

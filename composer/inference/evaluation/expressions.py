@@ -54,7 +54,7 @@ from composer.inference.values import (
 from composer.python_source.local_names import list_arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
 
 _KINDS: dict[type[ast.expr], type] = {ast.List: list, ast.Tuple: tuple, ast.Set: set}
@@ -122,7 +122,10 @@ class Expressions(Part):
             if isinstance(part, ast.FormattedValue):
                 value = self._evaluator.awaited(part.value, scope)
                 if part.format_spec is not None:
-                    self.evaluate(part.format_spec, scope)
+                    given = self.evaluate(part.format_spec, scope)
+                    if part.conversion == _NO_CONVERSION and isinstance(given, Constant):
+                        place = Place(scope.module, part.value)
+                        self._evaluator.refuse(place, _formatter(str(given.value)), value)
                 if part.format_spec is not None or part.conversion != _NO_CONVERSION:
                     value = Scalar(str, is_chosen(value))
             chosen = max(chosen, is_chosen(value))
@@ -495,3 +498,15 @@ def _is_globals(node: ast.expr) -> bool:
         case ast.Call(func=ast.Name('globals')):
             return True
     return False
+
+
+def _formatter(form: str) -> Callable[[object], str]:
+    """Return what formats a value, and refuses one of another type by a `TypeError`."""
+
+    def formatted(value: object) -> str:
+        try:
+            return format(value, form)
+        except ValueError as error:
+            raise TypeError(str(error)) from error
+
+    return formatted

@@ -14,6 +14,7 @@ from composer.inference.values import (
     Alternatives,
     ArrayField,
     Awaitable,
+    BoundMethod,
     Class,
     Constant,
     External,
@@ -200,6 +201,9 @@ class _Fit:
                 yield from self._other_message(description, value, place, path)
             case Mapping() if not value.is_lost:
                 yield from self._entries(description, value, path)
+            case PartOfNode(name='time' | 'duration' as part) if self.is_stored:
+                text = f'expected {in_python(type_name)}, got a {part} of rclpy'
+                yield self._misfit('field-type', text, place, path, 'write .to_msg()')
             case PartOfNode(name='time' | 'duration' as part):
                 stamp = Message(f'builtin_interfaces/msg/{part.title()}')
                 yield from self._other_message(description, stamp, place, path)
@@ -329,6 +333,11 @@ class _Fit:
         self, field_type: FieldType, value: Value, place: Place, path: tuple[str | int, ...]
     ) -> Iterator[Misfit]:
         match value:
+            case Constant() | Scalar() if (
+                self.is_stored and field_type.kind == 'byte' and value.kind is int
+            ):
+                text = f'expected {field_type}, got {_shown(value)}'
+                yield self._misfit('field-type', text, place, path, "rclpy takes bytes: b'\\x01'")
             case Constant() | Scalar() if self.is_stored and _is_whole(field_type, value):
                 text = f'expected {field_type}, got {_shown(value)}'
                 yield self._misfit('field-type', text, place, path, 'write it as a float: 1.0')
@@ -396,6 +405,10 @@ def _is_no_value(value: Value) -> bool:
         return value.name in KNOWN_RESULTS
     if isinstance(value, Instance):
         return value.is_no_value
+    if isinstance(value, BoundMethod):
+        kind = getattr(value.owner, 'kind', None)
+        is_builtin = isinstance(kind, type) and callable(getattr(kind, value.name, None))
+        return is_builtin or isinstance(value.owner, NodeValue) or value.name == 'to_msg'
     return isinstance(value, Function | Class | MessageClass | Partial | ProjectModule | NodeValue)
 
 
@@ -404,6 +417,8 @@ def _shown(value: Value) -> str:
     match value:
         case Function(definition=ast.FunctionDef() | ast.AsyncFunctionDef() as definition):
             return f"the function '{definition.name}'"
+        case BoundMethod(name=name):
+            return f"the method '{name}', which is not called"
         case Function() | Partial() | External():
             return 'a function'
         case Class() | MessageClass():

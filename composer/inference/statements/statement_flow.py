@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from composer.inference.evaluation.operators import combine
 from composer.inference.evaluation.part import Part
 from composer.inference.evaluation.waiting import THREAD
+from composer.inference.message_types import item_of
 from composer.inference.scopes import Names, Scope, join_names
 from composer.inference.values import (
     BY_STATE,
@@ -17,6 +18,7 @@ from composer.inference.values import (
     UNKNOWN,
     Argument,
     Arguments,
+    ArrayField,
     Awaitable,
     BoundMethod,
     Class,
@@ -91,6 +93,11 @@ class Statements(Part):
             [item for item, _ in each.items]
             for each in several
             if isinstance(each, Sequence) and each.is_whole
+        ]
+        rows += [
+            [item_of(each)] * (each.type.array_bound or 0)
+            for each in several
+            if isinstance(each, ArrayField) and each.type.array == 'fixed'
         ]
         if len(rows) == len(several) and not starred:
             fitting = [row for row in rows if len(row) == len(targets)]

@@ -16,6 +16,14 @@ CODE = """
 import json
 from array import array
 import numpy as np
+from dataclasses import dataclass
+from diagnostic_msgs.msg import DiagnosticStatus
+from sensor_msgs.msg import Imu
+from std_msgs.msg import String
+
+@dataclass(frozen=True)
+class Limits:
+    high: float
 
 
 def pair():
@@ -56,6 +64,23 @@ def hear(node, message):
         ("node.create_publisher('std_msgs/msg/String', 'x', qos='sensor_data')", None),
         ('node.publish(\'text\', json.dumps({"at": node.now()}))', 'bad-call'),
         ('a, b, c = pair()', 'bad-index'),
+        ('a, b, c = Imu().angular_velocity_covariance', 'bad-index'),
+        ("node.publish('imu', {'header': {'stamp': node.now()}})", None),
+        ("node.publish('imu', {'header': {'stamp': node.now().to_msg}})", 'field-type'),
+        ('Imu().header.stamp = node.now()', 'field-type'),
+        ('Imu().header.stamp = node.now().to_msg()', None),
+        ("node.publish('text', node.state.label.upper)", 'field-type'),
+        ('DiagnosticStatus(level=1)', 'field-type'),
+        ('DiagnosticStatus(level=DiagnosticStatus.WARN)', None),
+        ("print(f'{node.state.label:.2f}')", 'bad-call'),
+        ("print(f'{message.data:.2f} {node.state.label:>9}')", None),
+        ('node.ros.get_topics_names()', 'unknown-attribute'),
+        ('node.ros.get_topic_names_and_types(no_demangle=True)', None),
+        ("node.ros.create_publisher(String, 'x', qos=10)", 'bad-call'),
+        ("node.ros.create_publisher(String, 'x', 10)", None),
+        ("node.ros.get_logger().warn_once('x')", 'unknown-attribute'),
+        ('Limits(1.0).high = 2.0', 'unknown-attribute'),
+        ('Limits(1.0).other', 'unknown-attribute'),
         ('a, *b = pair()', None),
         ("node.publish('text', near(message.data))", 'field-type'),
         ('print(later); later = 1', 'undefined-name'),

@@ -236,3 +236,21 @@ def test_a_choice_that_is_misspelt_comes_with_the_nearest(tmp_path):
     )
     (finding,) = check_system(load_system(path), InterfaceCatalogue())
     assert (finding.rule, finding.help) == ('bad-parameter', "did you mean 'celsius'?")
+
+
+@pytest.mark.parametrize(
+    ('line', 'is_unused'),
+    [
+        ('print(node.parameters.speed)', True),
+        ('print(node.state.laps)', False),
+        ('node.state.laps = 1', False),
+        ("print(hasattr(node.state, 'laps'))", False),
+        ('print(vars(node.state))', False),
+        ("for each in ('laps',): print(getattr(node.state, each))", False),
+        ('import vendor; vendor.use(node)', False),
+    ],
+)
+def test_state_that_no_behaviour_uses_is_found(check, line, is_unused):
+    system = NODE.replace('    publishers', '    state: {laps: 0}\n    publishers')
+    found = check(system, run(USES_ALL, line), rule='unused-state')
+    assert bool(found) == is_unused

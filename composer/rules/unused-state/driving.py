@@ -1,0 +1,2 @@
+def drive(node):
+    node.state.distance += 0.1
