@@ -69,6 +69,11 @@ def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterato
     if problem:
         message = f"'{process.node_name}' cannot name a node: {problem}"
         yield context.at_value((*path, 'name'), 'bad-name', message)
+    listed = [each.full_name for each in process.nodes]
+    if len(listed) > 1 and not process.components and not {*process.named_nodes} <= {*listed}:
+        message = f"'name' renames all nodes of a process, and 'nodes' lists {len(listed)} others"
+        advice = "leave out 'name', or list the node that has it alone"
+        yield context.at_value((*path, 'name'), 'conflicting-keys', message, help=advice)
     problem = find_namespace_problem(process.namespace) if process.namespace else None
     if problem:
         message = f"'{process.namespace}': {problem}"

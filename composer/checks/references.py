@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, cast
 
 from composer.ament import explain_missing_package, has_content_filters
 from composer.diagnostics import diagnostic_at
+from composer.errors import ComposerError
 from composer.interfaces.descriptions import MessageDescription
 from composer.language.includes.include_entry import shown_path
 from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
+from composer.language.values.start_reader import read_from_file
 from composer.programs import base_environment, find_program_problem, shell_environment
 from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import passes_message_on
@@ -180,14 +182,28 @@ def describe_missing_type(context: CheckContext, full_name: str) -> tuple[str, s
 
 
 def check_start_values(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check that the programs and files exist that values come from; they are not run or read."""
+    """Check that the programs and files exist that values come from; no program is run.
+
+    Of the files, those of the project are read.
+    """
     for value in context.system.start.found:
         if value.is_elsewhere(context.spec.host):
             continue
         if value.command:
             yield from _check_command(value)
         else:
-            yield from _check_file(value.file, value.spans[0])
+            problems = [*_check_file(value.file, value.spans[0])]
+            yield from problems or _check_value(value)
+
+
+def _check_value(value: StartValue) -> Iterator[Diagnostic]:
+    # Files elsewhere may be others where the system runs.
+    if not value.named_files or os.path.isabs(os.path.expanduser(value.file)):  # noqa: PTH111, PTH117
+        return
+    try:
+        read_from_file(value)
+    except ComposerError as error:
+        yield diagnostic_at(value.spans[0], 'bad-start-value', str(error), help=error.help)
 
 
 def _check_command(value: StartValue) -> Iterator[Diagnostic]:

@@ -78,6 +78,15 @@ class StartValueReader:
         return self._printed[key]
 
 
+def read_from_file(value: StartValue) -> Any:
+    """Return a value that is in a file.
+
+    Raises:
+        ComposerError: The file cannot be read or has no such key, or it is of another type.
+    """
+    return _converted(value, _read_file(value))
+
+
 def _files(value: StartValue) -> list[Path]:
     return [path for path in value.named_files if os.path.exists(path)]
 

@@ -1,0 +1,2 @@
+def begin(node):
+    node.logger.info(f'{node.parameters.speed} m/s')
