@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from composer.errors import ExitCode
 from composer.scenarios.expectations.diffs import show_value
 from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
@@ -133,7 +132,7 @@ def check_exit(expected: ExitExpectationSpec, happened: Happenings) -> Iterator[
 def expects_refusal(case: CaseSpec) -> bool:
     """Return whether a case expects an error or an end, which may be at the start."""
     return any(
-        (isinstance(each, ExitExpectationSpec) and each.code == ExitCode.FAILED)
+        isinstance(each, ExitExpectationSpec)
         or (isinstance(each, ErrorExpectationSpec) and each.most != 0)
         for each in case.expectations
     )

@@ -59,7 +59,8 @@ CASES = [
     ('fails', 'works', '', '{error: driver, text: no motor}', [
         'on_start of /driver raised OSError: no port at 0 s',
         'expected an error of /driver with "no motor", got no error']),
-    ('fails', 'works', '', '{exit_code: 0}', ["node 'driver': on_start raised OSError('no port')"]),
+    *(('fails', 'works', '', f'{{exit_code: {code}}}',
+       [f'expected the system to end with exit code {code}, got 1 at 0.0005 s']) for code in (0, 2)),
     ('fails', 'works', '{at: 1, call: /driver/get_parameters}', '{exit_code: 1}',
      ['the step at 1 s is not done: the system ended at 0.0005 s']),
     ('works', 'works', '', '{error: driver, text: no port}',
