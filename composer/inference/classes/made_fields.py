@@ -38,7 +38,7 @@ class MadeFields(Part):
 
     def has_fields(self, of: Class) -> bool:
         """Return whether Python writes the `__init__` of a class from its fields."""
-        return self.is_tuple(of) or self._is_dataclass(of) or self.is_namespace(of)
+        return self.is_tuple(of) or self._is_dataclass(of)
 
     def is_tuple(self, of: Class) -> bool:
         """Return whether a class is that of a named tuple."""
@@ -88,15 +88,9 @@ class MadeFields(Part):
                             found[name] = _Field(name, each, target, default, kind)
         return found
 
-    def is_namespace(self, of: Class) -> bool:
-        """Return whether a class is that of a plain namespace."""
-        return 'types.SimpleNamespace' in self._evaluator.classes.bodies.externals(of)
-
     def store(self, instance: Instance, arguments: Arguments) -> None:
         """Store the arguments of a call in the fields, and the defaults of others."""
         fields = self._fields(instance.of)
-        for name, argument in arguments.named:
-            instance.set(name, argument.value)
         marks = [name for name, field in fields.items() if field.kind == 'KW_ONLY']
         by_position = [name for name, field in fields.items() if field.kind in ('', 'InitVar')]
         if marks:
@@ -125,7 +119,7 @@ class MadeFields(Part):
         if not calls or not all(isinstance(each, Class | External) for each in bases):
             return
         text = f"'{of.definition.name}' is called with other arguments than it takes: "
-        others = [] if self.is_namespace(of) else [name for name in given if name not in fields]
+        others = [name for name in given if name not in fields]
         if others:
             text += f"got an unexpected keyword argument '{others[0]}'"
             self._evaluator.run.report('bad-call', calls[-1], text, suggest(others[0], fields))
@@ -165,9 +159,6 @@ class MadeFields(Part):
         """Return the fields of an object, and where each is declared."""
         if not self.has_fields(owner.of):
             return None
-        if self.is_namespace(owner.of):
-            place = Place(owner.of.module, owner.of.definition)
-            return {name: (value, place) for name, value in owner.attributes.items()}
         return {
             name: (owner.attributes.get(name, UNKNOWN), Place(field.of.module, field.target))
             for name, field in self._fields(owner.of).items()

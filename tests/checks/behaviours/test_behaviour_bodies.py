@@ -100,9 +100,6 @@ class Gear(enum.IntEnum):
     HIGH = 2
 
 
-Move = namedtuple('Move', 'linear angul')  # of ASDICT
-
-
 def nested(depth):
     if depth:
         return nested(depth - 1)
@@ -500,12 +497,7 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
             'print(m.velocity)  # here',
             '# here',
         ),
-        (
-            "t = SimpleNamespace(linear={}, angul={})  # here\nnode.publish('command', vars(t))",
-            '# here',
-        ),
         ("node.publish('command', nested(2))", '# of NESTED'),
-        ("node.publish('command', Move({}, {})._asdict())", '# of ASDICT'),
         ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of VARS'),
         ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
     ],

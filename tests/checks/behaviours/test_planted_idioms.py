@@ -562,25 +562,12 @@ PLANTED = {
         def hear(node, m):
             Talker(node).go()
         """,
-    'a namespace': """
-        from types import SimpleNamespace
-        NAMES = SimpleNamespace(drive='<comand|command>', lift='level')
-        def hear(node, m):
-            node.publish(NAMES.drive, {})
-        """,
     'a class as a namespace': """
         class Names:
             class Out:
                 DRIVE = '<comand|command>'
         def hear(node, m):
             node.publish(Names.Out.DRIVE, {})
-        """,
-    'collections.namedtuple': """
-        from collections import namedtuple
-        Step = namedtuple('Step', ['topic', 'payload'])
-        def hear(node, m):
-            for step in [Step('level', 1), Step('<comand|command>', {})]:
-                node.publish(step.topic, step.payload)
         """,
     'a default dict': """
         from collections import defaultdict

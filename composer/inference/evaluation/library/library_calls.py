@@ -9,7 +9,6 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from composer.inference.classes.made_records import MadeRecords
 from composer.inference.current_run import name_place
 from composer.inference.evaluation.library.array_calls import ArrayCalls
 from composer.inference.evaluation.library.iterable_calls import IterableCalls
@@ -91,7 +90,6 @@ class LibraryCalls(Part):
             'functools.partial': self._partial,
             **self.iterables.handlers(),
             **self.mappings.handlers(),
-            **MadeRecords(evaluator).handlers(),
             **ArrayCalls(evaluator).handlers(),
         }
 
