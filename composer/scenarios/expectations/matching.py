@@ -9,8 +9,8 @@ infinite number as itself alone.
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Mapping, Sequence
-from ctypes import c_float
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +139,7 @@ class Comparison:
         if not (_is_number(expected) and _is_number(actual)):
             return _is_same_scalar(expected, actual)
         if is_narrow:
-            expected, actual = c_float(expected).value, c_float(actual).value
+            expected, actual = _to_float32(expected), _to_float32(actual)
         if expected == actual:
             return True
         if math.isnan(expected) or math.isnan(actual):
@@ -163,9 +163,9 @@ def _narrow(value: Any) -> Any:
     """Return a number of 32 bits with no more digits than it needs: 0.2, not 0.200000003."""
     if not isinstance(value, float) or not math.isfinite(value):
         return value
-    rounded = c_float(value).value
+    rounded = _to_float32(value)
     near = (float(f'{rounded:.{digits}g}') for digits in range(1, 9))
-    return next((each for each in near if c_float(each).value == rounded), rounded)
+    return next((each for each in near if _to_float32(each) == rounded), rounded)
 
 
 def _is_number(value: Any) -> bool:
@@ -190,3 +190,8 @@ def item_type(type_name: str) -> str:
     if type_name.startswith('sequence<'):
         return type_name.removeprefix('sequence<').removesuffix('>').partition(',')[0]
     return type_name.partition('[')[0]
+
+
+def _to_float32(value: float) -> float:
+    """Return the nearest number that a `float32` holds; infinity if it is too large."""
+    return array('f', (value,))[0]
