@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.description_reader import DescriptionReader
 from composer.launch_files.loading import Loader
-from composer.launch_files.marks import Mark, note_look
+from composer.launch_files.marks import Mark, following_texts, note_look
 from composer.launch_files.place import Place
 from composer.launch_files.substitutions import path_of, text_of
 from composer.launch_files.texts import has_marks
@@ -34,7 +34,7 @@ def import_file(path: Path, given: Mapping[str, str]) -> Imported:
     """
     place = Place(Loader(), dict(given))
     # Standard output is for the system, whatever launch files print.
-    with contextlib.redirect_stdout(sys.stderr), joining_marks():
+    with contextlib.redirect_stdout(sys.stderr), joining_marks(), following_texts():
         DescriptionReader(place).read([place.loader.open(path.absolute())])
     return place.result
 

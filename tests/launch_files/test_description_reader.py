@@ -2,6 +2,8 @@
 
 import os
 from functools import reduce
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from composer.errors import UsageError
 from composer.language.pipeline import load_system
 from composer.launch_files.description_reader import DescriptionReader
 from composer.launch_files.importing import joining_marks
+from composer.launch_files.marks import following_texts
 from composer.launch_files.place import Place
 from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
@@ -186,6 +189,47 @@ def test_what_a_function_may_decide_otherwise_with_another_value_cannot_change(t
     with joining_marks():
         system = read(launch.OpaqueFunction(decide))
     assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
+
+
+@pytest.mark.parametrize(
+    ('code', 'is_kept'),
+    [
+        ("f'{x}_x' == 'a_x'", False),
+        ("f'{x!r}' == 'a'", False),
+        ("'%s_x' % x == 'a_x'", False),
+        ("'{}_x'.format(x) == 'a_x'", False),
+        ("'_'.join([x, 'x']) == 'a_x'", False),
+        ("x + '_x' == 'a_x'", False),
+        ("f'{x}_x' in {'a_x'}", False),
+        ("x in 'abc'", False),
+        ("re.match('a', x)", False),
+        ("re.compile('a').search(f'{x}_')", False),
+        ("Path(x).suffix == '.a'", False),
+        ("PREFIXED(x).startswith('/a')", False),
+        ("[f'{x}_x', '%s' % x, '_'.join([x, 'x'])]", True),
+    ],
+)
+def test_texts_that_a_launch_file_makes_and_compares_cannot_change(tmp_path, code, is_kept):
+    path = tmp_path / 'x.launch.py'
+    path.write_text(
+        'import re\nfrom pathlib import Path\n'
+        "PREFIXED = lambda text: f'/{text}'\ndef decide(x): return bool(CODE)\n".replace(
+            'CODE', code
+        )
+    )
+    with joining_marks(), following_texts():
+        loader = SourceFileLoader('python_launch_file', str(path))
+        module = module_from_spec(spec_from_loader(loader.name, loader))
+        loader.exec_module(module)
+        system = read(
+            launch.OpaqueFunction(
+                lambda context: [
+                    node(name=f'{module.decide(context.launch_configurations["side"])}')
+                ]
+            )
+        )
+    choices = yaml.safe_load(system.text)['args']['side']['choices']
+    assert choices == (['left', 'right'] if is_kept else ['left'])
 
 
 @pytest.mark.parametrize('given', ['left', '/tmp/other', ''])
