@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
 from composer.processes.external_process import ExternalProcess, ProcessRun, describe_end
-from composer.processes.left_shared_memory import LeftPorts
 from composer.processes.reaper_client import ReaperConnection
 from composer.programs import base_environment
 from composer.records import record
@@ -218,7 +217,6 @@ class ProcessSupervisor:
             # However it has ended then.
             run.code = answer['code'] or (ExitCode.FAILED if run.has_failed else 0)
             run.ended.set()
-            self._lock_left_ports()
             watcher = threading.Thread(target=self._after_end, args=(run, run.code), daemon=True)
             self._watchers = [each for each in self._watchers if each.is_alive()]
             self._watchers.append(watcher)
@@ -228,11 +226,6 @@ class ProcessSupervisor:
         elif kind == 'gone':
             run.gone.set()
             self._runs.pop(run.number, None)
-
-    def _lock_left_ports(self) -> None:
-        """Keep the ports of a process that was killed from those that are started later."""
-        if self._tools is not None:
-            self._tools.left_ports.lock()
 
     def _report_killed(self, run: ProcessRun) -> None:
         spec = run.process.spec
@@ -281,8 +274,6 @@ class ProcessSupervisor:
             # If `ros2 launch` was killed, what it had started is still there.
             self._ask_to_end(run, tools)
             run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
-        # Until now, forked children of it that have ended since may have kept them.
-        self._lock_left_ports()
         try:
             self.start(process)
         except StartError as error:
@@ -361,7 +352,6 @@ class Tools:
         from composer.processes.process_folder import ProcessFolder
         from composer.processes.process_output import ProcessOutputs
 
-        self.left_ports = LeftPorts()
         self._folder = ProcessFolder()
         self.commands = CommandWriter(self._folder.path, ros_arguments, log_levels)
         self.outputs = ProcessOutputs()
@@ -370,7 +360,6 @@ class Tools:
     def close(self) -> None:
         """Kill what is left of the processes, and remove the temporary files."""
         self.reaper.close()
-        self.left_ports.close()
         self.outputs.close()
         self._folder.remove()
 

@@ -23,6 +23,7 @@ from composer.runtime.health.unmatched import GraphWatcher
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
+from composer.runtime.middleware.shared_memory import replacing_ports
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import SystemHandle
 from composer.runtime.reserved_methods import release, reserve
@@ -189,10 +190,11 @@ class LocalPart:
         Raises:
             StartError: One of them cannot be created.
         """
-        self._control.start(self._context, self._handle.ros_arguments)
-        if self._recorder is not None:
-            self._recorder.start(self._context, self._handle.topics)
-        self._create_nodes()
+        with replacing_ports():
+            self._control.start(self._context, self._handle.ros_arguments)
+            if self._recorder is not None:
+                self._recorder.start(self._context, self._handle.topics)
+            self._create_nodes()
         self._wait_for_clients(clients)
         self._executor.start()
         self._guardian.beat()

@@ -11,7 +11,7 @@ from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
 from composer.processes import own_process
-from composer.processes.left_shared_memory import remove_left_segments
+from composer.runtime.middleware.shared_memory import remove_left_segments
 from composer.runtime.reserved_methods import reserve
 
 if TYPE_CHECKING:

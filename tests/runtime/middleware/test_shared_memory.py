@@ -1,9 +1,10 @@
-"""Shared memory of killed processes: a start removes segments, and a system locks their ports."""
+"""A start removes the shared memory that killed processes of this user left, and nothing else."""
 
 import fcntl
 import os
 import re
 import signal
+import struct
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.processes import left_shared_memory
+from composer.runtime.middleware import shared_memory
 
 NAME = 'fastrtps_0123456789abcdef'
 SYSTEM = 'version: 1\nnodes: {talker: {}}\n'
@@ -20,7 +21,7 @@ SYSTEM = 'version: 1\nnodes: {talker: {}}\n'
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Return a folder in place of the one of shared memory."""
-    monkeypatch.setattr(left_shared_memory, '_FOLDER', tmp_path)
+    monkeypatch.setattr(shared_memory, '_FOLDER', tmp_path)
     return tmp_path
 
 
@@ -36,18 +37,18 @@ def write(folder, name=NAME, lock='_el'):
 @pytest.mark.parametrize('name', [NAME, 'fastdds_ffffffffffffffff'])
 def test_a_segment_that_nobody_locks_is_removed(folder, name):
     write(folder, name)
-    left_shared_memory.remove_left_segments()
+    shared_memory.remove_left_segments()
     assert list(folder.iterdir()) == []
 
 
 def test_a_lock_file_without_its_segment_is_removed(folder):
     write(folder)[0].unlink()
-    left_shared_memory.remove_left_segments()
+    shared_memory.remove_left_segments()
     assert list(folder.iterdir()) == []
 
 
 def is_kept(paths):
-    left_shared_memory.remove_left_segments()
+    shared_memory.remove_left_segments()
     return all(path.exists() for path in paths)
 
 
@@ -91,77 +92,65 @@ def test_a_link_is_kept(folder):
 
 
 def test_a_folder_that_is_not_there_is_no_error(folder, monkeypatch):
-    monkeypatch.setattr(left_shared_memory, '_FOLDER', folder / 'nowhere')
-    left_shared_memory.remove_left_segments()
+    monkeypatch.setattr(shared_memory, '_FOLDER', folder / 'nowhere')
+    shared_memory.remove_left_segments()
 
 
-PORT_LOCK = 'fastrtps_port7411_el'
+PORT, NODE_OFFSET, FLAGS_OFFSET = 7411, 256, 300
+OK_AND_OPENED = 7
 
 
-@pytest.fixture
-def left_ports():
-    """Return the ports that a system keeps locked."""
-    ports = left_shared_memory.LeftPorts()
-    yield ports
-    ports.close()
+def write_port(path, number=PORT):
+    """Write a port of shared memory: in its node, its number, two times and the flags count."""
+    node = struct.pack('<qIII5III', 5, 2, 600, 700, number, 1, 1000, 333, 512, 1, OK_AND_OPENED)
+    path.write_bytes(b'\1' * NODE_OFFSET + node + b'\2' * 2000)
+    return path.read_bytes()
 
 
-def touch_port(lock):
-    """Write a port and its lock file."""
-    lock.touch()
-    lock.with_name(lock.name.removesuffix('_el')).touch()
+def replace_port(folder, number=PORT, new=PORT):
+    """Return what others have mapped before and after a port is replaced by that of a new process."""
+    path = folder / f'fastrtps_port{PORT}'
+    before = write_port(path, number)
+    with path.open('rb') as mapped:
+        with shared_memory.replacing_ports():
+            path.unlink()
+            content = write_port(path, new)
+        assert path.read_bytes() == content
+        return before, mapped.read()
 
 
-def is_locked(path):
-    with path.open() as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
+def test_a_port_that_is_replaced_is_marked_as_unusable(folder):
+    before, after = replace_port(folder)
+    assert [at for at in range(len(before)) if before[at] != after[at]] == [FLAGS_OFFSET]
+    assert (before[FLAGS_OFFSET], after[FLAGS_OFFSET]) == (OK_AND_OPENED, OK_AND_OPENED - 1)
 
 
-def test_the_ports_of_killed_processes_are_locked_until_the_end(folder, left_ports):
-    paths = [folder / PORT_LOCK, folder / 'fastdds_port7413_el']
-    for path in paths:
-        touch_port(path)
-        left_ports.lock()
-    assert all(map(is_locked, paths))
-    left_ports.close()
-    assert not any(map(is_locked, paths))
+def test_a_port_that_is_removed_is_marked_as_unusable(folder):
+    path = folder / f'fastdds_port{PORT}'
+    write_port(path)
+    with path.open('rb') as mapped:
+        with shared_memory.replacing_ports():
+            path.unlink()
+        assert mapped.read()[FLAGS_OFFSET] == OK_AND_OPENED - 1
 
 
-@pytest.mark.parametrize('name', ['fastrtps_port7411', 'fastrtps_port7411_sl', f'{NAME}_el'])
-def test_no_other_files_are_locked(folder, left_ports, name):
-    touch_port(folder / name)
-    left_ports.lock()
-    assert not is_locked(folder / name)
+def test_a_port_that_is_not_replaced_stays(folder):
+    path = folder / f'fastrtps_port{PORT}'
+    before = write_port(path)
+    with shared_memory.replacing_ports():
+        pass
+    assert path.read_bytes() == before
 
 
-def test_the_lock_of_a_port_that_was_removed_is_given_up(folder, left_ports):
-    path = folder / PORT_LOCK
-    touch_port(path)
-    left_ports.lock()
-    path.with_name('fastrtps_port7411').unlink()
-    left_ports.lock()
-    assert not is_locked(path)
+def test_a_file_of_another_content_than_a_port_stays(folder):
+    before, after = replace_port(folder, number=PORT + 1)
+    assert before == after
 
 
-def test_ports_that_were_left_before_the_system_are_used_again(folder, left_ports):
-    path = folder / PORT_LOCK
-    touch_port(path)
-    os.utime(path, (1, 1))
-    left_ports.lock()
-    assert not is_locked(path)
-
-
-def test_the_port_of_a_living_process_is_left_to_it(folder, left_ports):
-    path = folder / PORT_LOCK
-    touch_port(path)
-    with path.open() as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        left_ports.lock()
-    assert not is_locked(path)
+def test_a_port_of_another_user_stays(folder, monkeypatch):
+    monkeypatch.setattr(os, 'geteuid', lambda: os.getuid() + 1)
+    before, after = replace_port(folder)
+    assert before == after
 
 
 def locks_of(child):
