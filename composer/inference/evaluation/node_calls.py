@@ -27,6 +27,7 @@ from composer.inference.values import (
     Arguments,
     Awaitable,
     Constant,
+    Generated,
     Instance,
     Mapping,
     Message,
@@ -158,10 +159,36 @@ class NodeCalls(Part):
             if kind.channel == 'service' and type_name:
                 answer = join(getattr(each, 'result', each) for each in alternatives(answer))
                 self._evaluator.payloads.check(f'{type_name}_Response', answer, behaviour.place)
+            publish = dict(arguments.named).get('publish')
+            if kind.publishes and publish is not None:
+                self._publish_results(publish, answer, behaviour.place)
         for argument in arguments.all():
             if argument is not behaviour:
                 self._evaluator.escape(argument.value)
         return UNKNOWN
+
+    def _publish_results(self, publish: Argument, answer: Value, place: Place) -> None:
+        """Note the publisher of what a behaviour returns, and check that against its type."""
+        run = self._evaluator.run
+        run.decide(publish.value)
+        names = alternatives(publish.value)
+        # Nothing is published for `None`.
+        results = [
+            join(each for each in alternatives(part) if not is_none(each))
+            for part in _results_of(answer)
+            if not all(map(is_none, alternatives(part)))
+        ]
+        for name in names:
+            if not isinstance(name, Constant) or not isinstance(name.value, str):
+                run.use_any('publisher', name, publish.place)
+                continue
+            is_guess = is_chosen(name) in (BY_PARAMETER, BY_STATE)
+            with run.condition(is_doubt=len(names) > 1):
+                at = name_place(publish, name)
+                run.use('publisher', name.value, at, is_guess=is_guess)
+                type_name = self._type_of('publishers', name.value)
+                for result in results if type_name else ():
+                    self._evaluator.payloads.check(type_name, result, place)
 
     def _check_options(self, kind: EntityKind, arguments: Arguments) -> None:
         """Check the keys that an entity is created with: they are those of the file."""
@@ -372,6 +399,16 @@ def _texts(value: Value) -> list[str | None]:
         each.value if isinstance(each, Constant) and isinstance(each.value, str) else None
         for each in alternatives(value)
     ]
+
+
+def _results_of(value: Value) -> tuple[Value, ...]:
+    """Return what a call of a behaviour gives away in the end."""
+    match value:
+        case Awaitable():
+            return (value.result,)
+        case Generated():
+            return (value.yielded, value.returned)
+    return (value,)
 
 
 def _kind_of(value: Value) -> type | None:

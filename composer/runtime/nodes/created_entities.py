@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 from composer.entity_kinds import KIND_OF_SECTION, TYPE_FOLDERS
 from composer.errors import ComposerError, StartError
 from composer.runtime.messages.qos_profiles import is_qos_profile, write_policies
+from composer.spelling import suggest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from composer.entity_kinds import EntityKind
     from composer.runtime.nodes.live_entity import LiveEntity
 
 # The module under which a behaviour that is given as a function stands in a spec.
@@ -153,6 +155,7 @@ class EntityCreation:
             message = f'a {kind.noun} cannot be created: {problem}'
             raise EntityError(message)
         with self._lock:
+            _check_publisher(node, kind, data.get('publish'))
             return self._make(node, section, data, (asked, default_name), given)
 
     def _make(
@@ -203,6 +206,17 @@ class EntityCreation:
                 del node.created[each]
         created.remove()
         node.forget(KIND_OF_SECTION[created.section].noun, created.name)
+
+
+def _check_publisher(node: Any, kind: EntityKind, publisher: str | None) -> None:
+    # Those that are declared may not be there yet.
+    known = {*node.entities['publishers'], *node.spec.publishers}
+    if publisher is not None and publisher not in known:
+        message = (
+            f"a {kind.noun} cannot publish: node '{node.spec.name}' has no publisher '{publisher}'"
+        )
+        advice = "declare it under 'publishers:', or create it first"
+        raise EntityError(message, help=suggest(publisher, known, 'it has', advice))
 
 
 def _created_name(section: str, name: str) -> str:

@@ -730,3 +730,51 @@ def test_the_response_of_a_created_service_is_checked(check, answer, rule):
     nodes = '\n  rover: {state: {answer: null}, on_start: parts:begin}\n'
     found = check(nodes, CREATED.replace('{answer}', answer))
     assert [each for _, each in found] == ([rule] if rule else [])
+
+
+RESULTS = """
+    def begin(node):
+        node.create_publisher('std_msgs/msg/Int8', 'made')
+        node.create_timer(1, give, publish={publish})
+        node.create_subscription('std_msgs/msg/Empty', '/in', hear, publish={publish})
+
+
+    {give}
+
+
+    def hear(node, message):
+        return None
+    """
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('publish', 'give', 'rules'),
+    [
+        ("'levl'", 'def give(node): return 1', ['unknown-publisher'] * 2),
+        ("'level'", "def give(node): return 'x'", ['field-type']),
+        ("'made'", "async def give(node): return 'x'", ['field-type']),
+        ("'made'", "def give(node):\n        yield 1\n        return 'x'", ['field-type']),
+        ("'made'", "def give(node):\n        yield {'dat': 1}", ['unknown-field']),
+        ("'level' if node.parameters.on else 'made'", 'def give(node): return 1', []),
+        (
+            "'levl' if node.parameters.on else 'made'",
+            'def give(node): return 1',
+            ['unknown-publisher'] * 2,
+        ),
+        ('node.state.out', "def give(node): return 'x'", []),
+        ('None', "def give(node): return 'x'", []),
+        ("'level'", 'def give(node): return 1 if node.parameters.on else None', []),
+    ],
+)
+def test_what_behaviours_of_created_entities_return_is_checked(check, publish, give, rules):
+    nodes = """
+  rover:
+    parameters: {on: true}
+    state: {out: level}
+    publishers: {level: {type: std_msgs/msg/Int8, external: true}}
+    on_start: parts:begin
+"""
+    found = check(nodes, RESULTS.replace('{publish}', publish).replace('{give}', give))
+    ignored = 'unused-parameter', 'unused-publisher'
+    assert [rule for _, rule in found if rule not in ignored] == rules

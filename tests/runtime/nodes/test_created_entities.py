@@ -42,6 +42,11 @@ class Rig:
             refused(node, *wrong)
         refused(node, String, 'x', name='fixed')
         refused(node, String, 'x', colour=3)
+        for out in ('fixt', 'fixed'):
+            try:
+                node.create_timer(0.05, give, publish=out)  # composer: ignore[unknown-publisher]
+            except Exception as error:
+                node.logger.info(f'wrong: {error}, {error.help}')
 
     def answer(self, node, request):
         return {'success': True, 'message': f'yes {self.number > 2}'}
@@ -96,6 +101,10 @@ def idle(node):
     pass
 
 
+def give(node):
+    return 'given'
+
+
 def hear(node, message):
     node.logger.info(f'plain heard {message.data}')
 """
@@ -106,7 +115,10 @@ def test_what_a_behaviour_creates_works_as_what_the_file_declares(compose):
     child.wait_until_ready()
     assert len(child.matching('refused: ')) == 5, child.output
     assert child.matching("refused: node 'rig' has a publisher 'fixed' already")
+    wrong = "a timer cannot publish: node 'rig' has no publisher 'fixt', did you mean 'fixed'?"
+    assert [line.rpartition('wrong: ')[2] for line in child.matching('wrong: ')] == [wrong]
     for line in (
+        '[other]: plain heard given',
         '[rig]: rig heard tick 1',
         "[rig]: subscription 'cam_0' (system.yaml:3) raised ValueError: two",
         '[rig]: rig heard tick 20',
