@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import yaml
@@ -23,6 +24,8 @@ _AFTER_GLUED = (
     "could not find expected ':'",
 )
 _QUOTES = ("'", '"')
+# PyYAML 6.0.4 brings a parser that refuses 1,000 levels before it tells of the first.
+_NESTED_TOO_DEEP = 'exceeded maximum nesting depth'
 
 # libyaml's parser is ten times faster; wheels of PyYAML bring it, source builds may not.
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
@@ -82,7 +85,7 @@ def compose_tree(text: str, source: SourceFile) -> TreeNode | None:
         CompositionError: The text is not YAML, nests too deep, holds several documents, or an
             alias that is unknown or contains itself.
     """
-    trees, _ = _compose(text, source, _TreeBuilder(source, most_documents=1))
+    trees, _ = _compose(text, source, partial(_TreeBuilder, source, most_documents=1))
     return trees[0] if trees else None
 
 
@@ -98,15 +101,22 @@ def compose_trees(
     Raises:
         CompositionError: The text is not YAML, nests too deep, holds an alias or too many values.
     """
-    return _compose(
-        text, source, _TreeBuilder(source, alias_rule=alias_rule, most_values=most_values)
-    )
+    create = partial(_TreeBuilder, source, alias_rule=alias_rule, most_values=most_values)
+    return _compose(text, source, create)
 
 
-def _compose(text: str, source: SourceFile, builder: _TreeBuilder) -> tuple[list[TreeNode], int]:
+def _compose(
+    text: str, source: SourceFile, create_builder: Callable[[], _TreeBuilder]
+) -> tuple[list[TreeNode], int]:
+    builder = create_builder()
     try:
         _parse(text, source, builder)
     except CompositionError as error:
+        refusal = error.__cause__
+        if isinstance(refusal, yaml.MarkedYAMLError) and refusal.problem == _NESTED_TOO_DEEP:
+            # The text before it goes beyond our own limit, or is wrong for another reason.
+            end = refusal.problem_mark.index if refusal.problem_mark else 0
+            return _compose(text[:end], source, create_builder)
         error.values = builder.values
         raise
     return builder.roots, builder.values

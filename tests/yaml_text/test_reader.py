@@ -290,11 +290,19 @@ def test_an_open_quote_says_where_it_was_opened():
     assert first_line('a: 1\nb: "never\nc: "closed"\n') == expected
 
 
-@pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? '])
-def test_ten_thousand_levels_are_one_finding(opening):
-    assert 'error[too-deep]: the data is nested more than 100 levels deep' in first_line(
-        opening * 10_000
+@pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? ', '[{é: '])
+@pytest.mark.parametrize('levels', [300, 10_000])
+def test_thousands_of_levels_are_the_finding_of_the_first_beyond_the_limit(opening, levels):
+    """PyYAML 6.0.4 refuses 1,000 levels by itself, and names the last of them."""
+    levels_each = opening.count('[{') + 1
+    column = 100 // levels_each * len(opening) + 1
+    assert first_line(opening * levels) == (
+        f'file.yaml:1:{column}: error[too-deep]: the data is nested more than 100 levels deep'
     )
+
+
+def test_an_error_before_a_thousand_levels_is_the_finding():
+    assert 'error[yaml-syntax]' in first_line('a: ]\nb: ' + '[' * 10_000)
 
 
 def test_ten_thousand_levels_of_indentation_are_one_finding():
