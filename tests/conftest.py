@@ -36,13 +36,6 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
-def pytest_terminal_summary(terminalreporter):
-    """Show why tests failed that were run once more, whatever came of that."""
-    for report in terminalreporter.stats.get('rerun', ()):
-        terminalreporter.section(f'first run of {report.nodeid}')
-        terminalreporter.line(report.longreprtext)
-
-
 @pytest.fixture(autouse=True)
 def process_of_no_system():
     """Fail a test that runs, in this process, a system that ends the process seconds later."""
