@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.ros_parameters.parameter_types import find_type_problem, find_type_problems
+from composer.ros_parameters.parameter_types import (
+    find_texts_for_bools,
+    find_type_problem,
+    find_type_problems,
+)
 from composer.spelling import suggest
+from composer.yaml_text.scalars import suggest_bool
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,9 +79,17 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
     value = parameter.value
     problems = [] if value is None else list(find_type_problems(value, parameter.type))
     for item, problem in problems:
-        yield context.at_value((*path, *item), _RULE, f"parameter '{parameter.name}': {problem}")
+        wrong = value[item[0]] if item else value
+        yield context.at_value(
+            (*path, *item),
+            _RULE,
+            f"parameter '{parameter.name}': {problem}",
+            help=suggest_bool(wrong) if parameter.type.startswith('bool') else None,
+        )
     if problems:
         return
+    if parameter.choices is None and not _has_type(context, parameter):
+        yield from warn_of_texts_for_bools(context, value, path)
     limits = list(_check_limits(context, parameter))
     yield from limits
     if not limits and parameter.value is not None:
@@ -87,6 +100,18 @@ def _check_parameter(context: CheckContext, parameter: ParameterSpec) -> Iterato
             yield context.at_value(path, _RULE, message, help=near)
 
 
+def warn_of_texts_for_bools(
+    context: CheckContext, value: Any, path: DataPath
+) -> Iterator[Diagnostic]:
+    """Warn of words that ROS's parameter files have for bools."""
+    for at, message, advice in find_texts_for_bools(value, path, context.system.positions):
+        yield context.at_value(at, 'text-for-bool', message, help=advice)
+
+
+def _has_type(context: CheckContext, parameter: ParameterSpec) -> bool:
+    return (*parameter.path, 'type') in context.system.positions.values
+
+
 def _value_path(context: CheckContext, parameter: ParameterSpec) -> DataPath:
     inner = (*parameter.path, 'default')
     return inner if inner in context.system.positions.values else parameter.path
@@ -95,7 +120,7 @@ def _value_path(context: CheckContext, parameter: ParameterSpec) -> DataPath:
 def _check_limits(context: CheckContext, parameter: ParameterSpec) -> Iterator[Diagnostic]:
     assert parameter.type is not None  # noqa: S101 - told by the caller, for the type checker
     limits = [key for key in _LIMITS if getattr(parameter, key) is not None]
-    inferred = (*parameter.path, 'type') not in context.system.positions.values
+    inferred = not _has_type(context, parameter)
     if limits and inferred and parameter.type not in _NUMERIC:
         yield context.at_value(
             (*parameter.path, 'default'),
@@ -152,8 +177,9 @@ def _check_choices(context: CheckContext, parameter: ParameterSpec) -> Iterator[
 
 
 def find_nearest_choice(parameter: ParameterSpec, value: Any) -> str | None:
-    """Return the help for a text that is not one of the choices, but near one."""
-    return suggest(value, parameter.choices or ())
+    """Return the help for a text that is not one of the choices, but near one, or no bool."""
+    near = suggest(value, parameter.choices or ())
+    return suggest_bool(value) if parameter.type == 'bool' else near
 
 
 def find_refusal(parameter: ParameterSpec, value: Any) -> str | None:

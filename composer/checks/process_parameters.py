@@ -9,7 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.checks.connections.typos import find_typo
-from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
+from composer.checks.parameters import (
+    OF_EVERY_NODE,
+    find_nearest_choice,
+    find_refusal,
+    warn_of_texts_for_bools,
+)
 from composer.names import find_parameter_name_problem, with_article
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -19,11 +24,11 @@ from composer.ros_parameters.parameter_types import (
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import ParameterSpec, ProcessSpec
+    from composer.language.specs import ComponentSpec, ParameterSpec, ProcessSpec
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
@@ -36,13 +41,32 @@ def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that ROS takes the names and values."""
     for component in context.spec.components:
         path = (*component.path, 'parameters')
-        yield from _check_mapping(context, component.parameters, path, '', {})
+        given: dict[str, DataPath] = {}
+        yield from _check_mapping(context, component.parameters, path, '', given)
+        yield from _check_texts(context, component, given.values())
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
         seen: dict[str, DataPath] = {}
         yield from _check_mapping(context, process.parameters, path, '', seen)
+        declared = {name for node in process.nodes for name in node.parameters}
+        open_places = [at for name, at in seen.items() if name not in declared]
+        yield from _check_texts(context, process, open_places)
         if process.nodes:
             yield from _compare_with_declared(context, process, seen)
+
+
+def _check_texts(
+    context: CheckContext, owner: ProcessSpec | ComponentSpec, places: Iterable[DataPath]
+) -> Iterator[Diagnostic]:
+    for path in places:
+        yield from warn_of_texts_for_bools(context, _value_at(owner, path), path)
+
+
+def _value_at(owner: ProcessSpec | ComponentSpec, path: DataPath) -> Any:
+    value: Any = owner.parameters
+    for key in path[len(owner.path) + 1 :]:
+        value = value[key]
+    return value
 
 
 def _compare_with_declared(
@@ -71,9 +95,7 @@ def _compare_with_declared(
 def _find_refusals(
     context: CheckContext, process: ProcessSpec, path: DataPath, declared: list[ParameterSpec]
 ) -> Iterator[Diagnostic]:
-    value: Any = process.parameters
-    for key in path[len(process.path) + 1 :]:
-        value = value[key]
+    value = _value_at(process, path)
     for parameter in declared:
         if any(path[: len(parameter.path)] == each.path for each in declared):
             return  # The value of the declaration itself.
@@ -85,7 +107,7 @@ def _find_refusals(
             got, wanted = with_article(inferred), with_article(parameter.type)
             problem: str | None = f'expected {wanted}, and ROS takes this for {got}'
             is_whole = (parameter.type, inferred) == ('double', 'integer')
-            help_text = f'write {float(value)}' if is_whole else None
+            help_text = f'write {float(value)}' if is_whole else help_text
         else:
             problem = find_refusal(parameter, value)
         if problem:

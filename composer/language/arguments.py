@@ -17,7 +17,7 @@ from composer.ros_parameters.parameter_types import (
 )
 from composer.spelling import suggest
 from composer.terminal import escape
-from composer.yaml_text.scalars import ScalarError, parse_plain_scalar
+from composer.yaml_text.scalars import ScalarError, parse_plain_scalar, suggest_bool
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -190,10 +190,10 @@ def find_declaration_errors(
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
         if value is not None and (problem := _find_default_problem(value, argument.type)):
-            yield keys, problem, None
+            yield keys, problem, find_help(argument, value)
     if default is not None and choices and default not in choices:
         message = f'the default {default!r} is not one of the choices'
-        yield ('default',), message, suggest(default, choices)
+        yield ('default',), message, find_help(argument, default)
 
 
 def _find_default_problem(value: Any, type_name: str) -> str | None:
@@ -262,7 +262,8 @@ def _assign_words(
 def _parse_value(argument: ArgumentSpec, text: str, problems: list[str]) -> Any:
     value: Any = text if argument.type == 'string' else _parse_text(text, argument.type)
     problem = find_value_problem(argument, value)
-    problems += [problem] if problem else []
+    advice = suggest_bool(value) if argument.type == 'bool' else None
+    problems += [f'{problem} ({advice})' if advice else problem] if problem else []
     return value
 
 
@@ -272,6 +273,11 @@ def find_value_problem(argument: ArgumentSpec, value: Any) -> str | None:
     if not problem and argument.choices and value not in argument.choices:
         problem = f'{value!r} is not one of {_listed(argument.choices)}'
     return problem and f"'{argument.name}': {problem}"
+
+
+def find_help(argument: ArgumentSpec, value: Any) -> str | None:
+    """Return the help for a wrong value of an argument."""
+    return suggest_bool(value) if argument.type == 'bool' else suggest(value, argument.choices)
 
 
 def _parse_text(text: str, type_name: str) -> Any:

@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING, Any
 from composer.confidential import may_show_lines
 from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.input_limits import MAX_COMBINATIONS
-from composer.language.arguments import ArgumentValues, find_value_problem, sample_values
+from composer.language.arguments import (
+    ArgumentValues,
+    find_help,
+    find_value_problem,
+    sample_values,
+)
 from composer.language.includes.include_entry import locate_file, shown_path
 from composer.language.layers import merge_documents
 from composer.language.paths import PathError
@@ -123,7 +128,7 @@ def values_from_combination(
             value = convert_parameter_value(given[name], argument.type)
             problem = find_value_problem(argument, value)
             if problem:
-                span, near = positions.value((*at, name)), suggest(value, argument.choices)
+                span, near = positions.value((*at, name)), find_help(argument, value)
                 findings.append(diagnostic_at(span, 'argument-type', problem, help=near))
             else:
                 values[name] = value

@@ -12,6 +12,7 @@ from composer.language.arguments import (
     parse_declarations,
     sample_values,
 )
+from composer.ros_parameters.parameter_types import find_texts_for_bools
 from composer.schema.structure import correct_outer_keys, is_sound
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def give_arguments(system: LoadedSystem, give_values: GiveValues) -> None:
     system.arguments = parse_declarations(system.entries)
     findings = list(_check_declarations(system.arguments, system.positions))
     system.diagnostics += [*findings, *_check_variables(system)]
+    system.diagnostics += _warn_of_texts_for_bools(system.arguments, system.positions)
     is_usable = not findings and is_sound({'args': written})
     if not all(argument.type for argument in system.arguments.values()):
         from composer.language.values.computed_values import infer_argument_types
@@ -115,3 +117,16 @@ def _check_declarations(
             path = ('args', name, *key)
             span = positions.value(path) if key else positions.key(path)
             yield diagnostic_at(span, 'bad-argument-declaration', problem, help=advice)
+
+
+def _warn_of_texts_for_bools(
+    declared: Mapping[str, ArgumentSpec], positions: SourceMap
+) -> Iterable[Diagnostic]:
+    for name, argument in declared.items():
+        path = ('args', name)
+        if argument.choices or (*path, 'type') in positions.values:
+            continue
+        for keys in ((), ('default',)):
+            found = find_texts_for_bools(argument.default, (*path, *keys), positions)
+            for at, message, advice in found:
+                yield diagnostic_at(positions.value(at), 'text-for-bool', message, help=advice)

@@ -9,9 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.names import with_article
+from composer.yaml_text.scalars import BOOLS_OF_YAML_1_1, suggest_bool
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 PARAMETER_TYPES = (*_SCALARS.values(), *(f'{name}_array' for name in ('byte', *_SCALARS.values())))
@@ -19,6 +22,7 @@ PARAMETER_TYPES = (*_SCALARS.values(), *(f'{name}_array' for name in ('byte', *_
 INT64_MIN = -(2**63)
 INT64_MAX = 2**63 - 1
 _BYTE_MAX = 255
+_WORDS = tuple(BOOLS_OF_YAML_1_1)
 
 
 def infer_parameter_type(value: Any) -> str | None:
@@ -64,6 +68,28 @@ def find_type_problems(value: Any, type_name: str) -> Iterator[tuple[tuple[int, 
         for index, item in enumerate(value):
             if problem := _find_item_problem(item, item_type):
                 yield (index,), f'item {index}: {problem}'
+
+
+def find_texts_for_bools(
+    value: Any, path: DataPath, positions: SourceMap
+) -> Iterator[tuple[DataPath, str, str]]:
+    """Yield where `no`, `on` and the like stand without quotes, with a message and help.
+
+    They are texts here and true in Python, and bools in ROS's parameter files. In a list with
+    other texts they are meant as texts.
+    """
+    places = (
+        {(*path, index): item for index, item in enumerate(value)}
+        if isinstance(value, list)
+        else {path: value}
+    )
+    if not all(isinstance(item, bool) or item in _WORDS for item in places.values()):
+        return
+    for at, item in places.items():
+        span = positions.values.get(at)
+        if span is not None and span.text == item:
+            message = f"'{item}' is a text, not a bool, and true in Python"
+            yield at, message, f"{suggest_bool(item)}, or '{item}' in quotes for the text"
 
 
 def _find_item_problem(item: Any, item_type: str) -> str | None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
 from composer.names import with_article
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN, infer_parameter_type
-from composer.yaml_text.scalars import TAG_STR
+from composer.yaml_text.scalars import BOOLS, BOOLS_OF_YAML_1_1, TAG_STR
 from composer.yaml_text.tree import (
     CompositionError,
     MappingNode,
@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 RULE = 'bad-parameter-file'
 ParameterScalar: TypeAlias = bool | int | float | str
 
-_TRUE = frozenset({'Y', 'y', 'yes', 'Yes', 'YES', 'true', 'True', 'TRUE', 'on', 'On', 'ON'})
-_FALSE = frozenset({'N', 'n', 'no', 'No', 'NO', 'false', 'False', 'FALSE', 'off', 'Off', 'OFF'})
+_BOOLS = {**BOOLS_OF_YAML_1_1, **BOOLS}
 _DOTTED = re.compile(r'(\.nan|\.NaN|\.NAN|[-+]?\.(?:inf|Inf|INF))')
 
 _SPACE = r'[ \t\n\v\f\r]*'
@@ -158,10 +157,8 @@ def read_scalar(node: ScalarNode) -> ParameterScalar:
 
 def read_plain_scalar(text: str) -> ParameterScalar:
     """Return the value that rcl reads in a scalar without quotes, of plain or block style."""
-    if text in _TRUE:
-        return True
-    if text in _FALSE:
-        return False
+    if text in _BOOLS:
+        return _BOOLS[text]
     integer = _read_integer(text)
     if integer is not None:
         return integer

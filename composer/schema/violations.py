@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 from composer.records import record
+from composer.yaml_text.scalars import suggest_bool
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -123,12 +124,13 @@ def wrong_type(error: ValidationError, expected: str) -> Violation:
     path = path_of(error)
     empty = error.instance is None and expected == 'a mapping'
     help_text = 'write {} for an empty mapping, or remove the key' if empty else None
+    is_bool = _TYPE_WORDS['boolean'] in expected
     return Violation(
         'wrong-type',
         f'expected {expected}, got {show_value(error.instance)}',
         path,
         droppable(path),
-        help=help_text or _full_form(error),
+        help=help_text or (suggest_bool(error.instance) if is_bool else None) or _full_form(error),
     )
 
 

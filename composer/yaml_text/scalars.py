@@ -8,7 +8,12 @@ from typing import TypeAlias
 Scalar: TypeAlias = str | int | float | bool | None
 
 _NULL = frozenset({'', '~', 'null', 'Null', 'NULL'})
-_BOOL = {'true': True, 'True': True, 'TRUE': True, 'false': False, 'False': False, 'FALSE': False}
+BOOLS = {'true': True, 'True': True, 'TRUE': True, 'false': False, 'False': False, 'FALSE': False}
+# What is a text here, and a bool in YAML 1.1 and in ROS's parameter files.
+BOOLS_OF_YAML_1_1 = {
+    **dict.fromkeys(('y', 'Y', 'yes', 'Yes', 'YES', 'on', 'On', 'ON'), True),
+    **dict.fromkeys(('n', 'N', 'no', 'No', 'NO', 'off', 'Off', 'OFF'), False),
+}
 _INT = re.compile(r'[-+]?[0-9]+')
 _OCT = re.compile(r'0o[0-7]+')
 _HEX = re.compile(r'0x[0-9a-fA-F]+')
@@ -17,7 +22,7 @@ _INF = re.compile(r'[-+]?\.(inf|Inf|INF)')
 _NAN = frozenset({'.nan', '.NaN', '.NAN'})
 _NUMBER_START = frozenset('+-.0123456789')
 # All others begin a text.
-_OTHER_START = _NUMBER_START | {text[0] for text in (*_NULL, *_BOOL) if text}
+_OTHER_START = _NUMBER_START | {text[0] for text in (*_NULL, *BOOLS) if text}
 
 # No ROS field or parameter holds an integer of more than 20 digits. Beyond this bound they are not
 # even doubles, and much longer ones Python will not read or print (sys.set_int_max_str_digits).
@@ -49,8 +54,8 @@ def parse_plain_scalar(text: str) -> Scalar:
         return text
     if text in _NULL:
         return None
-    if text in _BOOL:
-        return _BOOL[text]
+    if text in BOOLS:
+        return BOOLS[text]
     return _parse_number(text) if text[0] in _NUMBER_START else text
 
 
@@ -78,6 +83,12 @@ def format_scalar(value: Scalar) -> str:
     if isinstance(value, bool):
         return 'true' if value else 'false'
     return str(value)
+
+
+def suggest_bool(value: object) -> str | None:
+    """Return the help for a value that has to be a bool, if it is one in YAML 1.1."""
+    meant = BOOLS_OF_YAML_1_1.get(value) if isinstance(value, str) else None
+    return None if meant is None else f'write {format_scalar(meant)}'
 
 
 def short_tag(tag: str) -> str:

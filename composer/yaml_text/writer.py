@@ -9,7 +9,12 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from composer.records import record
-from composer.yaml_text.scalars import ScalarError, format_scalar, parse_plain_scalar
+from composer.yaml_text.scalars import (
+    BOOLS_OF_YAML_1_1,
+    ScalarError,
+    format_scalar,
+    parse_plain_scalar,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -110,7 +115,10 @@ def render_key(key: str, dialect: Dialect) -> str:
 def render_scalar(value: Any, dialect: Dialect) -> str:
     """Return a scalar as YAML."""
     if isinstance(value, str):
-        is_plain = not dialect.quotes_values and _is_plain(value)
+        # `no` would read as a bool that somebody forgot.
+        is_plain = (
+            not dialect.quotes_values and value not in BOOLS_OF_YAML_1_1 and _is_plain(value)
+        )
         return value if is_plain else _quote(value, dialect)
     if isinstance(value, float):
         return _render_double(value, dialect)

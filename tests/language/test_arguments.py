@@ -85,7 +85,7 @@ def test_words_give_values_by_name_or_in_the_order_of_the_declarations(words, ch
         (['a', ''], "'count': expected an integer, got ''"),
         (['a', 'null'], "'count': expected an integer, got 'null'"),
         (['a', '9223372036854775808'], "'count': 9223372036854775808 does not fit in 64 bits"),
-        (['a', 'loud:=yes'], "'loud': expected a bool, got 'yes'"),
+        (['a', 'loud:=yes'], "'loud': expected a bool, got 'yes' (write true)"),
         (['a', 'loud:=1'], "'loud': expected a bool, got 1"),
         (['a', 'mode:=slow'], "'mode': 'slow' is not one of '', fast, very slow"),
     ],

@@ -5,7 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, diagnostic_at
-from composer.language.arguments import ArgumentValues, find_value_problem, sample_values
+from composer.language.arguments import (
+    ArgumentValues,
+    find_help,
+    find_value_problem,
+    sample_values,
+)
 from composer.ros_parameters.parameter_types import convert_parameter_value
 from composer.spelling import suggest
 
@@ -39,7 +44,7 @@ def values_from_include(
                 origins[name] = _origin(place.system, path)
             elif not place.is_open(path):
                 span = place.system.positions.value(path)
-                near = _nearest_choice(argument, value)
+                near = find_help(argument, value)
                 findings.append(diagnostic_at(span, 'argument-type', problem, help=near))
             if problem or place.is_open(path):
                 unknown.append(name)
@@ -72,7 +77,3 @@ def _missing_argument(argument: ArgumentSpec, place: IncludeEntry) -> Diagnostic
     message = f"'{place.file}' needs the argument '{argument.name}'"
     help_text = f"give it under 'args': {argument}"
     return diagnostic_at(place.span, 'missing-argument', message, help=help_text)
-
-
-def _nearest_choice(argument: ArgumentSpec, value: Any) -> str | None:
-    return suggest(value, argument.choices)
