@@ -1,5 +1,6 @@
 # Everything lives in .venv, which this file makes. Where a ROS 2 is sourced, that one is used.
 # With ROS=kilted, it is .venv-kilted, which has the wheels of Kilted instead of Jazzy's.
+# Both have the versions of constraints/; with NEWEST=1, a .venv-newest has the newest ones.
 CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
 # Most tests wait, for processes and discovery: two cores serve more processes of tests than two.
@@ -14,9 +15,20 @@ EXTRAS := ros-kilted,interfaces,graph,hosts,ros-kilted-test,dev
 else
 EXTRAS := ros,interfaces,graph,hosts,ros-test,dev
 endif
+# The packages of a ROS 2 that is sourced are not ours to choose.
+LOCKED := constraints/$(or $(ROS),jazzy).txt
+ifndef ROS_DISTRO
+CONSTRAINTS := $(LOCKED)
+PIP_FLAGS := --constraint $(CONSTRAINTS)
+endif
+ifdef NEWEST
+VENV := $(VENV)-newest
+CONSTRAINTS := newest
+PIP_FLAGS := --upgrade --upgrade-strategy eager
+endif
 BIN := $(VENV)/bin
 
-.PHONY: up test check format docs bench clean
+.PHONY: up test check format docs bench lock clean newest
 
 up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
@@ -39,14 +51,24 @@ docs: $(VENV)/ready
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks.run --json build/bench.json $(ARGS)
 
-clean:
-	rm -rf .venv .venv-kilted build dist .mypy_cache .pytest_cache .ruff_cache
+# The versions of the lowest Python are there for newer ones, too. All have wheels but empy.
+lock:
+	@test -z "$(ROS_DISTRO)" || { echo 'run make lock without a sourced ROS 2: it lists the wheels of one'; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "make lock needs Python 3.11: set PYTHON=python3.11")'
+	@$(PYTHON) -m venv --clear build/lock
+	@build/lock/bin/pip install --quiet --disable-pip-version-check --dry-run --ignore-installed \
+	  --only-binary :all: --no-binary empy --report build/lock.json --editable '.[$(EXTRAS)]'
+	@$(PYTHON) -c 'import json; packages = json.load(open("build/lock.json"))["install"]; \
+	  print(*sorted("{name}=={version}".format(**package["metadata"]) for package in packages if not package["is_direct"]), sep="\n")' >$(LOCKED)
 
-$(VENV)/ready: pyproject.toml Makefile
+clean:
+	rm -rf .venv .venv-* build dist .mypy_cache .pytest_cache .ruff_cache
+
+$(VENV)/ready: pyproject.toml Makefile $(CONSTRAINTS)
 	@echo 'setting up $(VENV), which takes about a minute'
 	@# One whose set-up was interrupted may have halves of packages.
 	@test -e $@ || rm -rf $(VENV)
 	@rm -f $@
 	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
-	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	@$(BIN)/pip install --quiet --disable-pip-version-check $(PIP_FLAGS) --editable '.[$(EXTRAS)]'
 	@touch $@
