@@ -67,8 +67,8 @@ def blocking_calls(
         if threads.mine() is None or is_called_by_python or not is_valid:
             return start.original(function, arguments, *keywords)
         call = partial(function, *arguments, **(keywords[0] if keywords else {}))
-        run: Callable[..., Any] = threads.run
-        return start.original(run, (threads.add(), call))
+        with threads.added(call) as thread:
+            return start.original(threads.run, (thread,))
 
     yield start, start_new_thread
 

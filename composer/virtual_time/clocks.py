@@ -64,7 +64,7 @@ def _clock(
     get_ident = REAL.get_ident
 
     def read_ns() -> Any:
-        thread = by_ident.get(get_ident())
+        thread = by_ident.get(get_ident()) or threads.mine()
         if thread is None:
             return original()
         thread.looks += 1
@@ -73,7 +73,7 @@ def _clock(
         return start_ns + threads.now_ns
 
     def read_sec() -> Any:
-        thread = by_ident.get(get_ident())
+        thread = by_ident.get(get_ident()) or threads.mine()
         if thread is None:
             return original()
         thread.looks += 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import threading
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.virtual_time.clocks import to_ns
@@ -36,8 +37,10 @@ def thread_methods(
     def start_in_turn(self: Any) -> None:
         if threads.mine() is not None and not self._started.is_set():
             on_start()
-            self._simulated = threads.add()
-        start(self)
+            with threads.added(partial(bootstrap, self)) as self._simulated:
+                start(self)
+        else:
+            start(self)
 
     def bootstrap_in_turn(self: Any) -> None:
         simulated = getattr(self, '_simulated', None)
@@ -47,7 +50,7 @@ def thread_methods(
             report = self._invoke_excepthook
             # What comes of the end of the simulation is no error of the thread.
             self._invoke_excepthook = lambda who: simulated.is_ending or report(who)
-            threads.run(simulated, bootstrap, self)
+            threads.run(simulated)
 
     def join_in_turn(self: Any, timeout: Any = None) -> None:
         simulated = getattr(self, '_simulated', None)

@@ -14,6 +14,7 @@ class SimulatedThread:
     """A thread that takes turns with others.
 
     Attributes:
+        call: What it does; `None` once that is over.
         turn: A real lock that is free when it is this thread's turn.
         ident: What `threading.get_ident` says in it; 0 before it has begun.
         native: What `threading.get_native_id` says in it; 0 before it has begun.
@@ -24,9 +25,20 @@ class SimulatedThread:
         error: What is raised where it waits.
     """
 
-    __slots__ = ('error', 'ident', 'is_ending', 'is_over', 'looks', 'native', 'on_wait', 'turn')
+    __slots__ = (
+        'call',
+        'error',
+        'ident',
+        'is_ending',
+        'is_over',
+        'looks',
+        'native',
+        'on_wait',
+        'turn',
+    )
 
-    def __init__(self) -> None:
+    def __init__(self, call: Callable[[], object] | None = None) -> None:
+        self.call = call
         self.turn = REAL.allocate_lock()
         REAL.acquire(self.turn)
         self.ident = self.native = 0

@@ -12,6 +12,7 @@ import itertools
 import logging
 from collections import deque
 from contextlib import contextmanager
+from functools import partial
 from operator import itemgetter
 from threading import get_native_id
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -66,7 +67,8 @@ class SimulatedThreads:
         on_advance: Called with the time when it has become that.
         turns: How many turns there have been.
         begin_tracing: Called in each thread that begins, to look at its lines; `None` for nothing.
-        by_ident: The threads that wait in virtual time now, by what `threading.get_ident` says.
+        by_ident: The threads that wait in virtual time now, by what `threading.get_ident` says;
+            also those that have ended: finalizers may run in their last steps.
     """
 
     def __init__(self, shuffle: Random | None = None, limit_sec: float = 30.0) -> None:
@@ -82,15 +84,24 @@ class SimulatedThreads:
         self._numbers = itertools.count()
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
-        self._is_picking = False
+        # Of the thread that looks for the next turn now; 0 for nobody.
+        self._picking_ident = 0
         self._watch = StuckWatch(limit_sec)
         self.begin_tracing: Callable[[], None] | None = (
             Preemption(shuffle, self.pause).begin if shuffle is not None else None
         )
 
     def mine(self) -> SimulatedThread | None:
-        """Return the thread that calls, if it takes turns and waits in virtual time now."""
-        return self.by_ident.get(_get_ident())
+        """Return the thread that calls, if it takes turns and waits in virtual time now.
+
+        Raises:
+            RuntimeError: It gives its turn away: what is due then depends on no real clock.
+        """
+        thread = self.by_ident.get(_get_ident())
+        if thread is None and self._picking_ident == _get_ident():
+            message = 'what comes next is looked for in real time'
+            raise RuntimeError(message)
+        return thread
 
     @contextmanager
     def entered(self) -> Iterator[None]:
@@ -113,41 +124,54 @@ class SimulatedThreads:
         """Let the waits of the calling thread be real ones, and nobody else run meanwhile."""
         ident = _get_ident()
         thread = self.by_ident.pop(ident, None)
+        picking_ident, self._picking_ident = self._picking_ident, 0
         try:
             yield
         finally:
+            self._picking_ident = picking_ident
             if thread is not None:
                 self.by_ident[ident] = thread
 
-    def add(self) -> SimulatedThread:
-        """Return a new thread, which `run` makes of a real one; its turn comes."""
-        thread = SimulatedThread()
+    @contextmanager
+    def added(self, call: Callable[[], object]) -> Iterator[SimulatedThread]:
+        """Give a new thread turns, which `run` makes of a real one that is started meanwhile."""
+        thread = SimulatedThread(call)
         self._ready.append(thread)
+        try:
+            yield thread
+        except (RuntimeError, MemoryError):
+            # The system can start no more threads: nobody would ever pass this turn on.
+            self._ready.remove(thread)
+            raise
+
+    def start(self, function: Callable[..., object], *args: object) -> SimulatedThread:
+        """Call a function in a new thread, when its turn comes.
+
+        Raises:
+            RuntimeError: The system can start no more threads.
+        """
+        with self.added(partial(function, *args)) as thread:
+            REAL.start_new_thread(self.run, (thread,))
         return thread
 
-    def run(self, thread: SimulatedThread, function: Callable[..., Any], *args: Any) -> None:
-        """Call a function when it is the turn of `thread`, which is the calling thread then."""
+    def run(self, thread: SimulatedThread) -> None:
+        """Make its call when it is the turn of `thread`, which is the calling thread then."""
         REAL.acquire(thread.turn)
         thread.ident, thread.native = _get_ident(), get_native_id()
         self.by_ident[thread.ident] = thread
         try:
             if self.begin_tracing is not None:
                 self.begin_tracing()
-            if thread.error is None:
-                function(*args)
+            if thread.error is None and thread.call is not None:
+                thread.call()
         except SystemExit:
             pass
         finally:
+            # What only it refers to ends in its turn, too: finalizers may do anything.
+            thread.call = None
             thread.is_over = True
-            del self.by_ident[thread.ident]
             if thread is self.current:
                 self._pass_on(self._pick())
-
-    def start(self, function: Callable[..., Any], *args: Any) -> SimulatedThread:
-        """Call a function in a new thread, when its turn comes."""
-        thread = self.add()
-        REAL.start_new_thread(self.run, (thread, function, *args))
-        return thread
 
     def call_at(self, time_ns: int, function: Callable[[], None]) -> Call:
         """Have a function called at a time, or now if that has passed; it must not wait.
@@ -184,7 +208,7 @@ class SimulatedThreads:
             message = 'a thread that takes no turns waits for those that do'
             raise RuntimeError(message)
         if me.ident != _get_ident():
-            # It was given up: others go on without it.
+            # It was given up, or has ended: others go on without it.
             raise SystemExit
         if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
             raise EndedWhileWaitingError
@@ -222,14 +246,15 @@ class SimulatedThreads:
 
     def let_time_pass(self, thread: SimulatedThread) -> None:
         """Wait a little, as the calling thread looks at clocks all the time."""
-        if thread is self.current and not self._is_picking:
+        if thread is self.current and not self._picking_ident:
             self.sleep(_STEP_NS)
             thread.looks = MOST_LOOKS - _LOOKS_PER_STEP
 
     def pause(self) -> None:
         """Let others run first, if any can."""
         me = self.current
-        if me is None or me.ident != _get_ident():
+        # While it is outside, or gives its turn away, nobody else may run.
+        if me is None or self.by_ident.get(_get_ident()) is not me or self._picking_ident:
             return
         if me.on_wait is not None:
             me.on_wait()
@@ -329,11 +354,11 @@ class SimulatedThreads:
 
     def _pick(self) -> SimulatedThread:
         """Return the thread whose turn is next, at a later time if there is none now."""
-        self._is_picking = True
+        self._picking_ident = _get_ident()
         try:
             return self._find()
         finally:
-            self._is_picking = False
+            self._picking_ident = 0
 
     def _find(self) -> SimulatedThread:
         ready = self._ready
