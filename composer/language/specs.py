@@ -465,7 +465,8 @@ class ProcessSpec:
         most_restarts: How many times; `None` for no end.
         stop_signal: The signal that asks it to end.
         on_exit: What happens when it has ended and is not started again.
-        stop_timeout_sec: After this it is killed; `None` for the system's own.
+        stop_timeout_sec: After this it is killed, after half of it it gets SIGTERM; `None` for the
+            system's own.
         delay_sec: Time between the moment when its conditions hold and its start.
         on_demand: Whether it only starts when the `on_exit` of another one starts it.
         components: What is loaded into it, if it is a container.

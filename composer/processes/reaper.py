@@ -17,8 +17,9 @@ dies, however that happens, it kills every process that descends from those it s
 Requests and answers are one JSON object a line. Requests: `start` (a number that Composer chooses,
 `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number, `signal`,
 `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
-(`code`, negative for a signal), and `gone`, once nothing of its process group is left; `killed`
-comes before it if the timeout of a stop has passed. A second descriptor is for what a process
+(`code`, negative for a signal), and `gone`, once nothing of its process group is left; `terminated`
+comes before it if half the timeout of a stop has passed, and SIGTERM follows the signal that was
+asked for, and `killed` if all of it has. A second descriptor is for what a process
 writes to standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
@@ -46,6 +47,8 @@ _RLIMIT_LOCKS = 10
 _STACKS_SIGNAL = signal.SIGRTMAX
 _KILL_SEC = 5.0
 _POLL_SEC = 0.02
+# No other signal follows these but SIGKILL.
+_LAST_SIGNALS = (signal.SIGTERM, signal.SIGKILL)
 _CHUNK = 1 << 16
 _NEVER = float('inf')
 _EXEC_FAILED = 127
@@ -66,7 +69,7 @@ class _ProcessGroup:
         self.pid = pid
         self.has_ended = False
         self.is_killed = False
-        self.kill_at = _NEVER
+        self.terminate_at = self.kill_at = _NEVER
 
     def signal(self, number: int, *, alone: bool = False) -> bool:
         """Signal the group, or its leader alone; return whether any process is left in it."""
@@ -167,7 +170,11 @@ class Reaper:
         if group is None:
             self._answer('gone', request['number'])
             return
-        group.kill_at = time.monotonic() + request['timeout']
+        now, timeout_sec = time.monotonic(), request['timeout']
+        group.kill_at = now + timeout_sec
+        # `ros2 launch` leaves on SIGTERM what it has started, and sends that SIGTERM by itself.
+        if request['signal'] not in _LAST_SIGNALS and not request['alone']:
+            group.terminate_at = now + timeout_sec / 2
         group.signal(request['signal'], alone=request['alone'])
         # A stopped process handles the signal when it continues.
         group.signal(signal.SIGCONT)
@@ -190,16 +197,22 @@ class Reaper:
 
     def _check_groups(self) -> None:
         """Report the groups that are gone, and kill those that have run out of time."""
+        now = time.monotonic()
         for number, group in list(self._groups.items()):
             # The kernel does not reuse the ID of a group while a process is in it.
             if group.has_ended and not group.signal(0):
                 del self._groups[number]
                 self._answer('gone', number)
-            elif time.monotonic() >= group.kill_at:
+            elif now >= group.kill_at:
                 if not group.is_killed:
                     self._answer('killed', number)
                 group.is_killed = True
                 group.signal(signal.SIGKILL)
+            elif now >= group.terminate_at:
+                group.terminate_at = _NEVER
+                self._answer('terminated', number)
+                group.signal(signal.SIGTERM)
+                group.signal(signal.SIGCONT)
 
 
 def _execute(request: dict[str, Any], descriptors: list[int], report: int, reaper: int) -> None:

@@ -221,11 +221,21 @@ class ProcessSupervisor:
             self._watchers = [each for each in self._watchers if each.is_alive()]
             self._watchers.append(watcher)
             watcher.start()
+        elif kind == 'terminated':
+            self._report_terminated(run)
         elif kind == 'killed':
             self._report_killed(run)
         elif kind == 'gone':
             run.gone.set()
             self._runs.pop(run.number, None)
+
+    def _report_terminated(self, run: ProcessRun) -> None:
+        spec, limit_sec = run.process.spec, self._timeout_of(run.process.spec) / 2
+        if not run.is_given_up:
+            self._logger.warning(
+                f"{self._noun} '{spec.name}' did not end within {limit_sec:g} s of "
+                f'{spec.stop_signal}, and gets SIGTERM'
+            )
 
     def _report_killed(self, run: ProcessRun) -> None:
         spec = run.process.spec
@@ -255,7 +265,7 @@ class ProcessSupervisor:
         process, name = run.process, run.process.spec.name
         end = f"{self._noun} '{name}' {describe_end(code)}"
         if self._stopping.is_set() or process.is_leaving:
-            expected = (0, -signal.Signals[process.spec.stop_signal])
+            expected = (0, -signal.Signals[process.spec.stop_signal], -signal.SIGTERM)
             self._log(end, is_error=code not in expected and not run.was_killed)
             return
         if not process.is_restarted(code):

@@ -176,6 +176,29 @@ def test_nothing_is_left_after_a_clean_stop(compose, stubborn):
     assert child.matching("process 'asleep' was ended by SIGINT")
 
 
+def test_a_process_that_loses_its_signal_gets_sigterm(compose):
+    """Many programs lose a SIGINT that comes while they start; none should be killed for that."""
+    processes = {
+        name: {'command': shell(f'trap "" {lost}; echo {name} is there; sleep 1000'), 'stop': stop}
+        for name, lost, stop in (
+            ('late', 'INT', {}),
+            ('hung', 'HUP', {'signal': 'SIGHUP', 'timeout': 4.0}),
+        )
+    }
+    child = compose(system(processes, executor={'shutdown_timeout': 2.0}))
+    for name in processes:
+        child.wait_for_line(f'] {name} is there')
+    child.wait_until_ready()
+
+    assert child.stop() == 0, child.output
+    assert sorted(child.matching('SIGTERM')) == [
+        "[INFO] [composer]: process 'hung' was ended by SIGTERM",
+        "[INFO] [composer]: process 'late' was ended by SIGTERM",
+        "[WARN] [composer]: process 'hung' did not end within 2 s of SIGHUP, and gets SIGTERM",
+        "[WARN] [composer]: process 'late' did not end within 1 s of SIGINT, and gets SIGTERM",
+    ]
+
+
 def test_nothing_is_left_after_a_second_signal(compose, stubborn):
     child = compose_stubborn(compose, stubborn, executor={'shutdown_timeout': 3600})
     child.send(signal.SIGINT)
