@@ -17,10 +17,10 @@ dies, however that happens, it kills every process that descends from those it s
 Requests and answers are one JSON object a line. Requests: `start` (a number that Composer chooses,
 `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number, `signal`,
 `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
-(`code`, negative for a signal), and `gone`, once nothing of its process group is left; `terminated`
-comes before it if half the timeout of a stop has passed, and SIGTERM follows the signal that was
-asked for, and `killed` if all of it has. A second descriptor is for what a process
-writes to standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
+(`code`, negative for a signal), and `gone`, once nothing of its process group is left. Before it
+comes `terminated` if half the timeout of a stop has passed, and SIGTERM follows the signal that
+was asked for, and `killed` if all of it has. A second descriptor is for what a process writes to
+standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
 
