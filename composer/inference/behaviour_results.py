@@ -25,7 +25,7 @@ from composer.inference.values import (
     join,
 )
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.return_values import may_return_nothing, never_returns
+from composer.python_source.return_values import ends_without_value, never_returns
 
 if TYPE_CHECKING:
     from composer.inference.evaluation.evaluator import Evaluator
@@ -73,11 +73,6 @@ def _check_ways(
 ) -> None:
     """Check that all ways through a behaviour give the response or result that is waited for."""
     definition = callee.definition
-    nothing = [place for value, place in scope.returned if is_none(value)]
-    is_begun = (
-        len(nothing) < len(scope.returned) or not evaluator.functions.kind_of(callee).is_generator
-    )
-    certain = [each for each in nothing if is_begun and id(each.node) not in scope.doubtful]
     doubtful = [
         place
         for value, place in scope.returned
@@ -93,8 +88,15 @@ def _check_ways(
             and never_returns(called.definition)
         )
 
-    if not isinstance(definition, ast.Lambda) and may_return_nothing(definition, is_last):
-        doubtful.append(Place(callee.module, definition))
+    ends = [] if isinstance(definition, ast.Lambda) else ends_without_value(definition, is_last)
+    nothing = [place for value, place in scope.returned if is_none(value)]
+    certain = [
+        place
+        for place in nothing
+        if id(place.node) not in scope.doubtful
+        and (place.node in ends or isinstance(place.node, ast.Attribute | ast.Call | ast.Name))
+    ]
+    doubtful += [Place(callee.module, definition)] if ends else []
     for place in certain:
         evaluator.payloads.check(returned, NONE, place)
     if doubtful and not certain:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from itertools import product
 from typing import TYPE_CHECKING
 
 from composer.python_source.annotations import dotted_name
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
     from composer.python_source.syntax import FunctionNode
 
+# What was tested on a way; `None` if there is no way.
+_Tested = frozenset[str] | None
 # Expressions whose value is never `None`.
 _VALUES = (
     ast.BinOp,
@@ -26,6 +29,27 @@ _VALUES = (
     ast.UnaryOp,
 )
 _WITHOUT_RETURN = {'exit', 'quit', 'sys.exit', 'os._exit', 'os.abort'}
+_EXITS = {
+    '_exit',
+    'abort',
+    'assert_never',
+    'execl',
+    'execv',
+    'execve',
+    'execvp',
+    'exit',
+    'fail',
+    'quit',
+}
+_ENDLESS = {'count', 'cycle', 'repeat'}
+_TESTS_OF_TYPES = {'callable', 'hasattr', 'isinstance', 'issubclass', 'ok'}
+# What goes through something that has an end.
+_FINITE = {
+    *('enumerate', 'items', 'keys', 'len', 'list', 'max', 'min', 'open', 'range', 'reversed'),
+    *('set', 'sorted', 'split', 'splitlines', 'tuple', 'values', 'zip'),
+}
+# Handlers of these run when the process, or the task, ends.
+_AT_THE_END = ('CancelledError', 'GeneratorExit', 'KeyboardInterrupt', 'Shutdown', 'SystemExit')
 _CONVERSIONS = {'abs', 'bool', 'dict', 'float', 'int', 'len', 'list', 'round', 'str', 'sum'}
 
 
@@ -34,8 +58,7 @@ def always_answers(function: FunctionNode) -> bool:
 
     The second parameter, a message, is such a value, and so are its fields.
     """
-    arguments = [*function.args.posonlyargs, *function.args.args]
-    message = arguments[1].arg if len(arguments) > 1 else ''
+    message = _message_of(function)
     stored = {
         node.id
         for node in ast.walk(function)
@@ -44,19 +67,21 @@ def always_answers(function: FunctionNode) -> bool:
     sure = set() if message in stored else {message}
     answers = [statement.value for statement in _returns(function)]
     raises = any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function))
-    ends = not raises and _ends(function.body)
+    ends = not raises and _ends(function)
     return ends and all(_is_value(answer, sure) for answer in answers)
 
 
 def passes_message_on(function: FunctionNode) -> bool:
     """Return whether a function returns its second parameter, a message, as it is."""
-    arguments = [*function.args.posonlyargs, *function.args.args]
-    if len(arguments) <= 1:
-        return False
-    message = arguments[1].arg
-    if any(name.id == message for name in stored_names(ast.walk(function))):
+    message = _message_of(function)
+    if not message or any(name.id == message for name in stored_names(ast.walk(function))):
         return False
     return any(_may_be(answer.value, message) for answer in _returns(function))
+
+
+def _message_of(function: FunctionNode) -> str:
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    return arguments[1].arg if len(arguments) > 1 else ''
 
 
 def _may_be(answer: ast.expr | None, name: str) -> bool:
@@ -87,15 +112,25 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
     return isinstance(answer, _VALUES) or (isinstance(answer, ast.Name) and answer.id in sure)
 
 
-def may_return_nothing(function: FunctionNode, is_last: Callable[[ast.Call], bool]) -> bool:
-    """Return whether some paths through a function return a value, and others nothing.
+def ends_without_value(
+    function: FunctionNode, is_last: Callable[[ast.Call], bool] | None = None
+) -> list[ast.AST]:
+    """Return where a function ends without a value, on ways that are there for certain.
+
+    Where no way gives a value, any way that may end is one.
 
     Args:
-        is_last: Whether a call never returns.
+        is_last: Whether a call never returns; others have the names of such functions.
     """
-    answers = [each.value for each in _returns(function)]
-    bare = [each for each in answers if each is None]
-    return len(bare) < len(answers) and bool(bare or not _ends(function.body, is_last))
+    has_value = any(not _is_bare(answer) for answer in _returns(function))
+
+    def ends(call: ast.Call) -> bool:
+        is_named = _last_name(call.func) in _EXITS
+        return is_named or bool(is_last and is_last(call))
+
+    ways = _Ways(function, ends, is_certain=has_value)
+    is_end = ways.follow(function.body, frozenset()) is not None
+    return [*ways.bare, *([function] if is_end else [])]
 
 
 def never_returns(function: FunctionNode) -> bool:
@@ -103,36 +138,221 @@ def never_returns(function: FunctionNode) -> bool:
     said = dotted_name(function.returns) if function.returns is not None else ''
     if str(said).rpartition('.')[2] in ('NoReturn', 'Never'):
         return True
-    return not any(_returns(function)) and _ends(function.body)
+    return not any(_returns(function)) and _ends(function)
 
 
 def _is_exit(call: ast.Call) -> bool:
     return dotted_name(call.func) in _WITHOUT_RETURN
 
 
-def _ends(body: list[ast.stmt], is_last: Callable[[ast.Call], bool] = _is_exit) -> bool:
-    """Return whether no path through a block comes to its end: all return or raise."""
-    last = body[-1] if body else None
-    match last:
-        case ast.Return() | ast.Raise() | ast.Continue():
-            return True
-        case ast.Expr(value=ast.Call() as call):
-            return _is_exit(call) or is_last(call)
-        case ast.If(body=body, orelse=orelse):
-            return _ends(body, is_last) and _ends(orelse, is_last)
-        case ast.With() | ast.AsyncWith():
-            return _ends(last.body, is_last)
-        case ast.Try(body=body, orelse=orelse, finalbody=final, handlers=handlers):
-            blocks = [orelse or body, *(each.body for each in handlers)]
-            ended = [_ends(each, is_last) for each in (*blocks, final)]
-            return ended.pop() or all(ended)
-        case ast.Match(cases=cases):
-            is_whole = cases[-1].guard is None and _takes_all(cases[-1].pattern)
-            return is_whole and all(_ends(each.body, is_last) for each in cases)
-        case ast.While(test=ast.Constant(value=value)):
-            inner = [node for node in ast.walk(last) if isinstance(node, ast.Break)]
-            return bool(value) and not inner
-    return False
+def _ends(function: FunctionNode) -> bool:
+    """Return whether no way through a function comes to its end: all return or raise."""
+    return _Ways(function, _is_exit, is_certain=False).follow(function.body, frozenset()) is None
+
+
+def _is_bare(statement: ast.Return) -> bool:
+    return statement.value is None or (
+        isinstance(statement.value, ast.Constant) and statement.value.value is None
+    )
+
+
+class _Ways:
+    """The ways through a function, each with what was tested on it.
+
+    Two tests of one thing may leave no way past both: `if x: return 1` and `elif not x: return 2`.
+
+    Args:
+        is_certain: Whether to follow only ways that are there for certain, not all there may be.
+
+    Attributes:
+        bare: The `return` without a value that some way comes to.
+    """
+
+    def __init__(
+        self, function: FunctionNode, is_last: Callable[[ast.Call], bool], *, is_certain: bool
+    ) -> None:
+        self.bare: list[ast.expr | ast.Return] = []
+        self._message = _message_of(function)
+        self._is_last = is_last
+        self._is_certain = is_certain
+        self._continued: list[_Tested] = []
+        self._broken: list[_Tested] = []
+        self._sources: dict[str, set[str]] = {}
+        for node in ast.walk(function) if is_certain else ():
+            if isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) and node.value:
+                subjects = self._subjects(node.value)
+                for name in stored_names(ast.walk(node)):
+                    self._sources.setdefault(name.id, set()).update(subjects)
+
+    def follow(self, block: list[ast.stmt], tested: _Tested) -> _Tested:
+        """Return what was tested on the way to the end of a block; `None` if there is no way."""
+        for statement in block:
+            if tested is None:
+                break
+            tested = self._past(statement, tested)
+        return tested
+
+    def _past(self, statement: ast.stmt, tested: frozenset[str]) -> _Tested:
+        match statement:
+            case ast.Return():
+                self.bare += [statement.value or statement] if _is_bare(statement) else []
+            case ast.Break() | ast.Continue():
+                is_break = isinstance(statement, ast.Break)
+                (self._broken if is_break else self._continued).append(tested)
+            case ast.Raise() | ast.Assert(test=ast.Constant(value=False | 0)):
+                pass
+            case ast.Expr(value=(ast.Call() as call) | ast.Await(value=ast.Call() as call)):
+                return None if self._is_last(call) else tested
+            case ast.If():
+                return self._past_if(statement, tested)
+            case ast.With() | ast.AsyncWith():
+                is_left = any('suppress' in ast.dump(item) for item in statement.items)
+                return _join(self.follow(statement.body, tested), tested if is_left else None)
+            case ast.For() | ast.AsyncFor() | ast.While():
+                return self._past_loop(statement, tested)
+            case ast.Match():
+                return self._past_match(statement, tested)
+            case ast.Try() | ast.TryStar():
+                return self._past_try(statement, tested)
+            case _:
+                return tested
+        return None
+
+    def _past_if(self, node: ast.If, tested: frozenset[str]) -> _Tested:
+        within = tested | self._subjects(node.test)
+        body = self.follow(node.body, within)
+        other = self.follow(node.orelse, within if self._may_fail(node.test, tested) else None)
+        # Where both branches come here, nothing is known of the test.
+        return tested if body == other == within else _join(body, other)
+
+    def _past_match(self, node: ast.Match, tested: frozenset[str]) -> _Tested:
+        within = tested | self._subjects(node.subject)
+        ends = [self.follow(case.body, within) for case in node.cases]
+        *others, last = node.cases
+        tests = [
+            ast.Compare(node.subject, [ast.Eq()], [case.pattern.value])
+            for case in node.cases
+            if isinstance(case.pattern, ast.MatchValue)
+        ]
+        is_single = isinstance(last.pattern, ast.MatchValue | ast.MatchSingleton) and not others
+        is_open = len(tests) == len(node.cases) and all(map(self._is_one_text, tests))
+        is_past = is_open or (is_single and not self._is_tested(node.subject, tested))
+        if _takes_all(last.pattern) and last.guard is None:
+            return _join(*ends)
+        return _join(*ends, within if is_past or not self._is_certain else None)
+
+    def _past_try(self, node: ast.Try | ast.TryStar, tested: frozenset[str]) -> _Tested:
+        bare, self.bare = self.bare, []
+        ends = [self.follow(node.orelse, self.follow(node.body, tested))]
+        for handler in node.handlers:
+            caught = ast.dump(handler.type) if handler.type else ''
+            is_rare = self._is_certain and any(name in caught for name in _AT_THE_END)
+            ends.append(self.follow(handler.body, None if is_rare else tested))
+        inner, self.bare = self.bare, bare
+        is_left = self.follow(node.finalbody, tested) is not None
+        # What `finally` returns replaces what was returned before.
+        self.bare += inner if is_left else []
+        return _join(*ends) if is_left else None
+
+    def _past_loop(
+        self, node: ast.For | ast.AsyncFor | ast.While, tested: frozenset[str]
+    ) -> _Tested:
+        source = node.test if isinstance(node, ast.While) else node.iter
+        before = self._continued, self._broken
+        self._continued, self._broken = [], []
+        # Which round is the last may be tested by what the loop stores.
+        stored = {name.id for name in stored_names(ast.walk(node))}
+        body = self.follow(node.body, tested | self._subjects(source) | stored)
+        body, broken = _join(body, *self._continued), self._broken
+        self._continued, self._broken = before
+        past = None if _is_endless(node) else tested
+        if self._is_certain and past is not None:
+            past = self._past_source(source, tested, body)
+        return _join(self.follow(node.orelse, past), *broken)
+
+    def _past_source(self, source: ast.expr, tested: frozenset[str], body: _Tested) -> _Tested:
+        """Return what was tested where a loop is certain to end: without a round, or after one."""
+        calls = [node.func for node in ast.walk(source) if isinstance(node, ast.Call)]
+        names = {_last_name(call) for call in calls}
+        if not names <= _FINITE:
+            return None
+        is_maybe_empty = self._is_given(source) or 'open' in names
+        return tested if is_maybe_empty else None if dotted_name(source) in self._sources else body
+
+    def _may_fail(self, test: ast.expr, tested: frozenset[str]) -> bool:
+        """Return whether a test may be false, whatever was tested before."""
+        if isinstance(test, ast.Constant) or not self._is_certain or self._is_one_text(test):
+            return not (isinstance(test, ast.Constant) and test.value)
+        parts = test.values if isinstance(test, ast.BoolOp) and isinstance(test.op, ast.Or) else []
+        subjects = [subject for part in parts for subject in self._subjects(part)]
+        # It may name all that there are.
+        is_whole = len(subjects) > len(set(subjects)) or any(
+            (isinstance(node, ast.Call) and _last_name(node.func) in _TESTS_OF_TYPES)
+            or (isinstance(node, ast.Compare) and _is_in(node) and not self._is_given(node.left))
+            for node in ast.walk(test)
+        )
+        return not is_whole and not self._is_tested(test, tested)
+
+    def _is_one_text(self, test: ast.expr) -> bool:
+        """Return whether a test is for one text in the message: it may always be another."""
+        match test:
+            case ast.Compare(left, [ast.Eq()], [ast.Constant(value=str())]):
+                return self._is_given(left)
+        return False
+
+    def _is_given(self, expression: ast.expr) -> bool:
+        """Return whether a value is of the message, which may be any."""
+        subjects = self._subjects(expression)
+        return any(subject.startswith(f'{self._message}.') for subject in subjects)
+
+    def _is_tested(self, expression: ast.expr, tested: frozenset[str]) -> bool:
+        """Return whether something of an expression, or that it is a part of, was tested."""
+        pairs = product(self._subjects(expression), tested)
+        return any(
+            f'{one}.'.startswith(f'{two}.') or two.startswith(f'{one}.') for one, two in pairs
+        )
+
+    def _subjects(self, expression: ast.expr) -> set[str]:
+        """Return what a value depends on: fields of the message, parameters, and objects."""
+        subjects: set[str] = set()
+        pending: list[ast.AST] = [expression]
+        while pending:
+            node = pending.pop()
+            if isinstance(node, ast.Call):
+                pending += [*node.args, *node.keywords]
+                if isinstance(node.func, ast.Attribute):
+                    pending.append(node.func.value)
+                elif not (node.args or node.keywords):
+                    # Functions without arguments may all read one thing.
+                    subjects.add('()')
+            elif isinstance(node, ast.Name | ast.Attribute) and (name := dotted_name(node)):
+                root = name.partition('.')[0]
+                is_whole = root == self._message or '.parameters.' in name
+                subjects |= {name if is_whole else root, *self._sources.get(root, ())}
+            else:
+                pending.extend(ast.iter_child_nodes(node))
+        return subjects
+
+
+def _is_endless(loop: ast.For | ast.AsyncFor | ast.While) -> bool:
+    """Return whether only its body ends a loop."""
+    if isinstance(loop, ast.While):
+        return isinstance(loop.test, ast.Constant) and bool(loop.test.value)
+    return isinstance(loop.iter, ast.Call) and _last_name(loop.iter.func) in _ENDLESS
+
+
+def _is_in(test: ast.Compare) -> bool:
+    return any(isinstance(operator, ast.In) for operator in test.ops)
+
+
+def _last_name(called: ast.expr) -> str:
+    return dotted_name(called).rpartition('.')[2] or getattr(called, 'attr', '?')
+
+
+def _join(*ends: _Tested) -> _Tested:
+    """Return what was tested on any of several ways; `None` if there is no way."""
+    ways = [end for end in ends if end is not None]
+    return frozenset().union(*ways) if ways else None
 
 
 def _takes_all(pattern: ast.pattern) -> bool:

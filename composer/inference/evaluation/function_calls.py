@@ -34,7 +34,7 @@ from composer.inference.values import (
 from composer.python_source.changed_names import changed_in
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource, read_signature
-from composer.python_source.return_values import never_returns
+from composer.python_source.return_values import ends_without_value, never_returns
 
 # How deep helpers of helpers are followed.
 _DEEPEST = 12
@@ -233,7 +233,11 @@ class Functions(Part):
                 scope.names = None
             else:
                 self._evaluator.statements.follow_all(definition.body, scope)
-                if scope.names is not None:
+                # Past tests that may leave out nothing, there may be no way to the end.
+                is_over = scope.names is None or (
+                    scope.returned and definition not in ends_without_value(definition)
+                )
+                if not is_over:
                     if run.doubts:
                         scope.doubtful.add(id(definition))
                     end = Place(function.module, definition)

@@ -661,6 +661,8 @@ UNANSWERED = {
     f'if not request.data: return\n    {GIVES}': 2,
     f'if request.data: return None\n    {GIVES}': 2,
     f'with open("x") as file:\n        if file: {GIVES}': 1,
+    f'if request.data: {GIVES}\n    if node.state: {GIVES}': 1,
+    f'for _ in range(3):\n        try: {GIVES}\n        except OSError: print()': 1,
 }
 ANSWERED = (
     f'if request.data: {GIVES}\n    raise ValueError',
@@ -673,6 +675,26 @@ ANSWERED = (
     f'if request.data: {GIVES}\n    fail()\n\ndef fail(): raise ValueError',
     f'if request.data: {GIVES}\n    fail()\n\nimport typing\ndef fail() -> typing.NoReturn: print()',
     f'try: {GIVES}\n    except OSError: fail()\n\nimport sys\ndef fail(): sys.exit(1)',
+    # Ways that may not be there.
+    f'if request.data: {GIVES}\n    elif not request.data: {GIVES}',
+    f'bad = not request.data\n    if bad: {GIVES}\n    if request.data: {GIVES}',
+    f'x = open("x")\n    if x.readable(): {GIVES}\n    elif x.writable(): {GIVES}',
+    f'if node.name in ("a", "b"): {GIVES}',
+    f'if node.name == "a" or node.name == "b": {GIVES}',
+    f'match request.data:\n        case True: {GIVES}\n        case False: {GIVES}',
+    f'match node.name:\n        case "a" | "b": {GIVES}',
+    f'while request.data:\n        if node.name: {GIVES}\n    else: {GIVES}',
+    f'for n in range(3):\n        try: {GIVES}\n        except OSError:\n            if n == 2: {GIVES}',
+    f'for low in (1, 2):\n        if low < len(node.name): {GIVES}',
+    f'import itertools\n    for n in itertools.count():\n        if node.state: {GIVES}',
+    f'for _ in tries(): {GIVES}\n\ndef tries():\n    while True: yield 1',
+    f'try: {GIVES}\n    except KeyboardInterrupt: print()',
+    f'try: return\n    finally: {GIVES}',
+    *(
+        f'import os, sys, typing\n    if request.data: {GIVES}\n    {end}'
+        for end in ('sys.exit(1)', 'os._exit(1)', 'typing.assert_never(request)', 'assert False')
+    ),
+    f'return help(request.data)\n\ndef help(on):\n    if on: {GIVES}\n    elif not on: {GIVES}',
 )
 
 
@@ -682,8 +704,28 @@ def test_a_way_without_a_response_is_found(check, body, line):
     assert check(ANSWER, f'def use(node, request):\n    {body}\n') == [(line, 'field-type')]
 
 
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ('body', 'findings'),
+    [
+        ('for n in range(3): yield {"sequence": [n]}', [(1, 'field-type')]),
+        ('yield {"sequence": [1]}\n    return', [(3, 'field-type')]),
+        ('yield {"sequence": [1]}\n    return {"sequence": [1]}', []),
+        ('while True: yield {"sequence": [1]}', []),
+        ('import itertools\n    for n in itertools.count(): yield {"sequence": [n]}', []),
+        ('yield {"sequence": [1]}\n    raise ValueError', []),
+    ],
+)
+def test_a_generator_of_an_action_returns_its_result(check, body, findings):
+    system = ANSWER.replace('services', 'actions').replace(
+        'std_srvs/srv/SetBool', 'test_msgs/action/Fibonacci'
+    )
+    assert check(system, f'def use(node, goal):\n    {body}\n') == findings
+
+
 # Ways that a parameter, an exception or a helper decides.
 DOUBTFUL = {
+    f'import contextlib\n    with contextlib.suppress(OSError): {GIVES}': 1,
     f'if node.parameters.on: {GIVES}': 1,
     f'if node.name == "switch": {GIVES}': 1,
     f'def answer(ok):\n        if ok: {GIVES}\n    return answer(request.data)': 4,

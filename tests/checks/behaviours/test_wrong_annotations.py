@@ -184,6 +184,7 @@ def test_an_action_is_annotated_with_its_parts(check):
 
         def do(node, goal: Fibonacci.{}) -> Generator[{}, None, {}]:
             yield
+            return Fibonacci.Result()
 
         def take(node, goal: Fibonacci.{}): ...
         def feel(node, feedback: Fibonacci.{}): ...
