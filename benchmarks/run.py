@@ -2,7 +2,7 @@
 
 python -m benchmarks.run [--only REGEX] [--rounds 3] [--quick] [--soak-sec 60] [--json FILE]
 
-The soak takes 60 s by default; 300 is for CI, 3600 for the hour that is promised.
+The soak takes 60 s by default; 300 is for a release, 3600 for the hour that is promised.
 """
 
 import argparse
