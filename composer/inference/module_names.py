@@ -100,14 +100,33 @@ class TopNames:
 
     @cached_property
     def is_dynamic(self) -> bool:
-        """Whether code may store any name: `globals()['x'] = 1`, `exec`."""
-        return any(
-            name in ('exec', 'eval') or self.changes.change_at(each) != NOTHING
-            for each in self._nodes
-            if isinstance(each, ast.Call)
-            for name in [getattr(each.func, 'id', '')]
-            if name in ('exec', 'eval', 'globals', 'vars')
-        )
+        """Whether code may store any name: `globals()['x'] = 1`, `exec`, `sys.modules`."""
+        return any(map(self._may_store_any, self._nodes))
+
+    def _may_store_any(self, node: ast.AST) -> bool:
+        match node:
+            case ast.Call(func=ast.Name('exec' | 'eval')):
+                return True
+            case ast.Call(func=ast.Name('globals' | 'locals' | 'vars')):
+                return self.changes.change_at(node) != NOTHING
+            case ast.Attribute(attr='modules') | ast.alias(name='modules'):
+                return True
+        return False
+
+    @cached_property
+    def fills_others(self) -> bool:
+        """Whether code may store any name in a module that is imported."""
+        imported = {alias.asname or alias.name for each in self.imports for alias in each.names}
+        for node in self._nodes:
+            match node:
+                case (
+                    ast.Call(func=ast.Name('setattr'), args=[ast.Name(id=name), key, _])
+                    | ast.Call(func=ast.Name('vars'), args=[ast.Name(id=name) as key])
+                    | ast.Attribute(value=ast.Name(id=name) as key, attr='__dict__')
+                ):
+                    if name in imported and not isinstance(key, ast.Constant):
+                        return True
+        return False
 
     @cached_property
     def stored_again(self) -> frozenset[str]:
@@ -226,7 +245,10 @@ class ProjectModules:
         """Return whether a name may exist in a module."""
         top = self.top(module)
         known = name in top.statements or hasattr(builtins, name) or name in top.changed
-        return known or top.is_open or name.startswith('__')
+        if known or top.is_open or top.is_dynamic or name.startswith('__'):
+            return True
+        others = [self.top(each) for each in tuple(self._read.values())]
+        return any(name in other.patched or other.fills_others for other in others)
 
     def value(
         self, module: ModuleSource, name: str, evaluate: Callable[[ast.AST, bool], Value]

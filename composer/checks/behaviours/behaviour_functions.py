@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related
+from composer.inference.module_names import TopNames
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.value_annotations import find_wanted_values
@@ -124,7 +125,7 @@ def _check_source(
             places = _places_of(module, function)
             yield found.with_related(Related('it is defined here', at) for at in places)
         yield from _check_constructor(context, behaviour, module)
-    elif not module.is_open:
+    elif not (module.is_open or TopNames(module.body).is_dynamic):
         yield _explain_missing_function(context, binding, module)
 
 

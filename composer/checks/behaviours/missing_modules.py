@@ -207,7 +207,8 @@ class _Walk:
             nearest = find_nearest(alias.name, known)
             top = TopNames(source.body)
             bound = top.statements.keys() | top.changed
-            if nearest or not (top.is_open or alias.name in bound or alias.name[:2] == '__'):
+            is_bound = top.is_open or alias.name in bound or alias.name[:2] == '__'
+            if not top.is_dynamic and (nearest or not is_bound):
                 message = f"{home} has no '{alias.name}'"
                 help_text = suggest(alias.name, known or bound, 'it has')
                 self._report(message, help_text, importer, place)
