@@ -24,7 +24,7 @@ from composer.terminal import escape
 from composer.yaml_text.reader import read_document
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from composer.language.loaded_system import LoadedSystem
     from composer.language.values.start_reader import StartValueReader
@@ -42,10 +42,12 @@ _MOST_LISTED = 20
 _SIMILAR = 0.8
 
 _TOP_KEY = re.compile(r'^(["\']?)([A-Za-z]\w*)\1\s*:(?=\s|$)', re.MULTILINE)
-_FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes)["\']?\s*:')
+_FLOW_KEY = re.compile(r'[{,]\s*["\']?(version|nodes|processes|containers|include)["\']?\s*:')
+_VERSION_1 = re.compile(r'^[{\s]*["\']?version["\']?\s*:\s*1\s*($|[#,}])', re.MULTILINE)
 _VERSION = re.compile(r'^["\']?version["\']?\s*:|^\s*\{', re.MULTILINE)
 _LIST = re.compile(r'\s*(#[^\n]*\n\s*)*(-\s|\[)')
 # Other keys, such as `parameters`, stand in other people's files, too.
+_WITHOUT_NODES = ('processes', 'containers', 'include')
 _ENTITIES = re.compile(rf'^\s+({"|".join(sorted(WORK_KEYS))})\s*:', re.MULTILINE)
 
 
@@ -243,8 +245,9 @@ def looks_like_system(path: Path) -> bool:
 
     A file is if it names the schema of Composer, or has the top-level keys `version` and `nodes`
     (`nodes` not being a list). If one of the two is missing or misspelt, publishers, timers and so
-    on must be below `nodes`. This excludes Docker Compose files, GitHub workflows and ROS 2
-    parameter files.
+    on must be below `nodes`; a file without nodes must have `version: 1`, something else to run,
+    and no keys of others. This excludes Docker Compose files, GitHub workflows and ROS 2 parameter
+    files.
     """
     try:
         text = read_file(path)[:_MAX_BYTES_READ].decode('utf-8-sig', errors='replace')
@@ -253,17 +256,30 @@ def looks_like_system(path: Path) -> bool:
     if re.search(rf'^#.*\$schema=\S*{re.escape(_SCHEMA)}', text, re.MULTILINE):
         return True
     if text.lstrip().startswith('{'):
-        return {match[1] for match in _FLOW_KEY.finditer(text)} == {'version', 'nodes'}
+        names = {match[1] for match in _FLOW_KEY.finditer(text)}
+        return 'version' in names and (
+            'nodes' in names or _runs_something(text, dict.fromkeys(names, 0))
+        )
     keys = {match[2]: match.end() for match in _TOP_KEY.finditer(text)}
     nodes = _find_near('nodes', keys)
-    if nodes is None or _LIST.match(text, keys[nodes]):
+    if nodes is None:
+        return _runs_something(text, keys)
+    if _LIST.match(text, keys[nodes]):
         return False
     if nodes == 'nodes' and _find_near('version', keys):
         return True
     return bool(_ENTITIES.search(text, keys[nodes]))
 
 
-def _find_near(wanted: str, keys: Mapping[str, int]) -> str | None:
+def _runs_something(text: str, keys: Mapping[str, int]) -> bool:
+    """Return whether a file without nodes runs something, by its keys and where they end."""
+    if not _VERSION_1.search(text) or not all(_find_near(key, known_keys('')) for key in keys):
+        return False
+    ends = [keys[key] for name in _WITHOUT_NODES if (key := _find_near(name, keys))]
+    return any(not _LIST.match(text, end) for end in ends)
+
+
+def _find_near(wanted: str, keys: Collection[str]) -> str | None:
     """Return the wanted key, or one that differs by about one letter."""
     if wanted in keys:
         return wanted
@@ -354,6 +370,7 @@ def _explain_nothing(word: str) -> Diagnostic:
             'nothing-to-check',
             'no system in this folder',
             word,
-            help="a system is a .yaml file with 'version:' and 'nodes:' at its top level",
+            help="a system is a .yaml file with 'version: 1' and 'nodes:', 'processes:', "
+            "'containers:' or 'include:' at its top level",
         )
     return Diagnostic('nothing-to-check', 'no file matches this pattern', word or "''")

@@ -110,6 +110,12 @@ def test_standard_input_is_a_dash():
         'nodes:\n  rover:\n    publishers: {}\n',
         'version: 1\nnodes:\n\tbroken',
         '\ufeffversion: 1\r\nnodes:\r\n  a: {}\r\n',
+        'version: 1\nprocesses:\n  a: {command: [ls]}\n',
+        '# Imported from a launch file.\nversion: 1  # the format\nargs: {}\ncontainers: {}\n',
+        'include:\n  a: {file: a.yaml}\nversion: 1\n',
+        'version: 1\nproceses: {}\narg: {}\n',
+        '{version: 1, include: {a: {file: a.yaml}}}',
+        '{"version": 1,\n "processes": {"a": {"command": "ls"}}}\n',
     ],
 )
 def test_what_is_meant_for_composer_is_known(tmp_path, text):
@@ -137,6 +143,14 @@ def test_what_is_meant_for_composer_is_known(tmp_path, text):
         'version: 1\nnode: {}\n',
         'model:\n  name: x\noperation:\n  name: y\n',
         'node:\n  name: x\nversions: {}\n',
+        'version: "0.5"\nprocesses:\n  a: {command: ls}\n',
+        'version: 1\nprocesses: [a]\n',
+        'version: 1\nprocesses: {}\nlog_level: info\n',
+        'version: 1\ninclude:\n  - local: a.yml\n',
+        'version: 1.2\ninclude: {}\n',
+        'processes: {}\n',
+        'version: 1\nhosts: {}\n',
+        '{"version": "3", "include": {}}',
     ],
 )
 def test_what_others_write_is_left_alone(tmp_path, text):
