@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from importlib.util import find_spec
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -195,7 +196,7 @@ def _check_program(context: CheckContext, process: ProcessSpec) -> Iterator[Diag
         return
     variables = {**shell_environment(), **context.spec.environment}
     environment = {**base_environment(variables), **process.env}
-    if program.startswith(_OF_ROS) and not is_on_path(_OF_ROS[0]):
+    if program.startswith(_OF_ROS) and not find_spec('rclpy'):
         return
     problem = find_program_problem(program, folder, environment)
     if problem:
