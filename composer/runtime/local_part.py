@@ -20,6 +20,7 @@ from composer.runtime.health.deliveries import find_deliveries
 from composer.runtime.health.hangs import HangWatcher
 from composer.runtime.health.system_state import Outcome, SystemState, system_title
 from composer.runtime.health.unmatched import GraphWatcher
+from composer.runtime.health.watched_clocks import Clocks
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
@@ -140,6 +141,9 @@ class LocalPart:
         self._control = ControlNode(
             self, spec, self._handle.health, self._hang_watcher, commands, worker
         )
+        if self._executor.runs_in_real_time:
+            clocks = Clocks(self._find_ros_nodes, self.state, tells_steps=not worker)
+            observers = (clocks, *observers)
         self._graph_watcher = GraphWatcher(
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints],
             lambda: self._any_ros,
@@ -232,6 +236,10 @@ class LocalPart:
     @property
     def _any_ros(self) -> Node | None:
         return next((node.ros for node in list(self._nodes.values())), self._control.ros)
+
+    def _find_ros_nodes(self) -> list[Node]:
+        control = self._control.ros
+        return [node.ros for node in list(self._nodes.values())] + ([control] if control else [])
 
     def run_on_start(self) -> bool:
         """Start processes and nodes that wait for nothing; return whether others wait.

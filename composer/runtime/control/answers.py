@@ -44,7 +44,7 @@ def describe_status(
         components: The full names of those that are loaded into containers.
         diagnostics: What measures the health of the entities; `None` if nothing does.
     """
-    health = None if diagnostics is None else _summarize(diagnostics)
+    health = None if diagnostics is None else _summarize(diagnostics, state)
     names = {'nodes': list(nodes), 'components': list(components)}
     return {**state.document(), **names, 'health': health}
 
@@ -133,9 +133,9 @@ def _answer(data: dict[str, Any]) -> Outcome:
     return Outcome(succeeded=True, text=json.dumps({'version': VERSION, **data}))
 
 
-def _summarize(diagnostics: DiagnosticsPublisher) -> dict[str, str]:
+def _summarize(diagnostics: DiagnosticsPublisher, state: SystemState) -> dict[str, str]:
     """Return the worst level of all entities, and the one that has it."""
-    worst, message = 0, ''
+    worst, message = int(bool(state.clock_problem)), state.clock_problem
     for (node, owner), report in diagnostics.latest.by_entity.items():
         level, text = _find_level(report)
         if level > worst:

@@ -151,6 +151,7 @@ def system_status(
     }
     problems = ['the last reload failed'] if state.last_error else []
     problems += [f'the clock of {host} differs' for host, each in clocks if each.is_off]
+    problems += [state.clock_problem] if state.clock_problem else []
     return DiagnosticStatus(
         name=f'{node}: system',
         hardware_id=state.name,

@@ -8,6 +8,7 @@ from rclpy.timer import Timer
 
 from composer.executor.sources.inbox import Inbox
 from composer.records import record
+from composer.runtime.health.watched_clocks import WallClock
 
 _LATE_SHARE = 0.1
 _MIN_LATE_NS = 1_000_000
@@ -88,6 +89,7 @@ class MissedTicks(MissedNothing):
     def __init__(self) -> None:
         self._late = 0
         self._skipped = 0
+        self._wall_clock = WallClock()
 
     def __call__(self) -> MissedCounts:
         """Return what it has missed."""
@@ -95,6 +97,9 @@ class MissedTicks(MissedNothing):
 
     def on_tick(self, late_ns: int, next_ns: int, period_ns: int) -> None:
         """Note a tick that began `late_ns` after its time; the next is `next_ns` after its."""
+        if self._wall_clock.find_step_ns():
+            # It is late by the step.
+            return
         if late_ns > _MIN_LATE_NS and late_ns > _LATE_SHARE * period_ns:
             self._late += 1
         # rcl sets the next tick to the next multiple of the period that has not passed.

@@ -68,6 +68,7 @@ class SystemState:
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
         find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
+        clock_problem: What keeps the clocks of nodes from going; empty if nothing does.
         clocks: Those of other hosts that have been compared, by the names of these.
     """
 
@@ -80,6 +81,7 @@ class SystemState:
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
         self.clocks: dict[str, ClockSkew] = {}
+        self.clock_problem = ''
         self.begun = time.monotonic()
         self._started = time.time()
         self._reloads = 0
