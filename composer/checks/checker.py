@@ -22,7 +22,7 @@ from composer.checks.connections.loops import check_loops
 from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.remap_rules import check_remap_rules
 from composer.checks.connections.typos import check_typos
-from composer.checks.connections.unconnected import check_other_ends
+from composer.checks.connections.unconnected import check_clock, check_other_ends
 from composer.checks.connections.wait_conditions import check_waits
 from composer.checks.context import CheckContext
 from composer.checks.environment import check_environment
@@ -108,6 +108,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_qos_pairs,
     check_deadlines,
     check_other_ends,
+    check_clock,
     check_loops,
     check_deadlocks,
     check_blocked_groups,

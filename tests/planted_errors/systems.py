@@ -88,7 +88,8 @@ class Generator:
         if chance.random() < 0.3:
             node['log_level'] = chance.choice(('debug', 'info', 'warn', 'error'))
         if chance.random() < 0.3:
-            node['use_sim_time'] = chance.random() < 0.5
+            # Nothing publishes `/clock`.
+            node['use_sim_time'] = False
         if chance.random() < 0.3:
             node['on_error'] = chance.choice(('log', 'restart', 'shutdown'))
         node['parameters'] = {self.name(): self._parameter() for _ in range(chance.randint(0, 4))}

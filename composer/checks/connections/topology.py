@@ -195,12 +195,16 @@ class Topology:
         action = self.channels.get(('action', owner)) if separator else None
         return channel.name in self.ros_services or bool(action and action.providers)
 
-    def may_have_more(self, channel: Channel) -> bool:
-        """Return whether the end that a channel lacks may be one of the possible ones."""
+    def may_have_more(self, channel: Channel, type_name: str | None = None) -> bool:
+        """Return whether the end that a channel lacks may be one of the possible ones.
+
+        Args:
+            type_name: Its type, where the channel has no end at all.
+        """
         is_provider = not channel.providers
         if (channel.kind, channel.name, is_provider) in self.created:
             return True
-        types = (None, *(end.entity.type for end in channel.ends))
+        types = (None, type_name, *(end.entity.type for end in channel.ends))
         return any((channel.kind, is_provider, type_) in self.possible for type_ in types)
 
 

@@ -8,17 +8,25 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from composer.checks.connections.topology import OF_ACTIONS, TOPICS_OF_ROS, is_misnamed
+from composer.checks.connections.topology import (
+    OF_ACTIONS,
+    TOPICS_OF_ROS,
+    Channel,
+    full_name,
+    is_misnamed,
+)
 from composer.checks.connections.typos import find_typo, is_slip
 from composer.spelling import count_edits, did_you_mean, find_nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.checks.connections.topology import Channel, Endpoint, Topology
+    from composer.checks.connections.topology import Endpoint, Topology
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.entity_kinds import ChannelKind
 
+_CLOCK, _CLOCK_TYPE = '/clock', 'rosgraph_msgs/msg/Clock'
 # Names are compared one by one; a file that wants more suggestions is checked without the rest.
 _MOST_COMPARED = 5_000
 
@@ -38,6 +46,32 @@ def check_other_ends(context: CheckContext) -> Iterator[Diagnostic]:
                 if not (is_missed or (near and _is_likely(context, end, channel, near))):
                     continue
                 yield _explain(context, channel, end, near, *end.kind.unmatched)
+
+
+def check_clock(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that somebody may publish the time that nodes with `use_sim_time` follow."""
+    spec, topology = context.spec, context.topology
+    nodes = spec.nodes.values()
+    unused = context.system.unused
+    programs = [*spec.processes, *spec.components, *(unused.processes if unused else ())]
+    if programs or not any(node.use_sim_time for node in nodes) or not _knows_all_ends(context):
+        return
+    awaited = {condition.name for node in nodes for condition in node.wait_for}
+    if any(reading.reaches_ros for node in nodes for reading in context.readings(node)):
+        return
+    for node in nodes:
+        key: tuple[ChannelKind, str] = ('topic', full_name(node, 'topic', _CLOCK))
+        channel = topology.channels.get(key, Channel(*key))
+        # What is heard or awaited here may be published elsewhere; a file may say `false`.
+        is_open = bool(channel.ends) or channel.name in awaited
+        is_open |= bool(node.parameter_files) or key in topology.left_out
+        if node.use_sim_time and not is_open and not topology.may_have_more(channel, _CLOCK_TYPE):
+            yield context.at_key(
+                (*node.path, 'use_sim_time'),
+                'no-clock',
+                f"nothing in this system publishes '{channel.name}', whose time this node has",
+                help='add what publishes it, such as a simulator, under processes',
+            )
 
 
 def _knows_all_ends(context: CheckContext) -> bool:
