@@ -13,7 +13,7 @@ from composer.runtime.control import protocol
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Sequence
 
     from composer.application.running_systems.client import RunningSystem
     from composer.runtime.health.system_state import Outcome
@@ -95,7 +95,7 @@ def _open_process(pid: int) -> int | None:
         return None
 
 
-def _find_node(systems: Iterable[RunningSystem], name: str) -> tuple[RunningSystem, str]:
+def _find_node(systems: Sequence[RunningSystem], name: str) -> tuple[RunningSystem, str]:
     """Return the system that has a node, and the node's full name.
 
     Args:
@@ -115,6 +115,10 @@ def _find_node(systems: Iterable[RunningSystem], name: str) -> tuple[RunningSyst
         message = f"several nodes are called '{name}'"
         listed = ', '.join(f'{node} (of {system.name})' for system, node in found)
         raise UsageError(message, help=f'give its full name: {listed}')
+    silent = [system.name for system in systems if system.problem == 'no answer']
+    if silent:
+        message = f"no system that answers has a node '{name}', and '{silent[0]}' does not answer"
+        raise ComposerError(message, help='try again')
     names = {node for _, node in nodes} | {node.rpartition('/')[2] for _, node in nodes}
     advice = suggest(name, names, 'there are', 'no system runs')
     message = f"no system on this ROS graph has a node '{name}'"

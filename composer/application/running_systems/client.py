@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _POLL_SEC = 0.05
 # How often it is seen whether who was asked is still there.
 _LOOK_SEC = 0.5
+_ASK_AGAIN_SEC = 1.0
 STATUS_SEC = 5.0
 
 
@@ -176,17 +177,30 @@ class Client:
 
         clients = [self.node.create_client(Trigger, name) for name in services]
         wait_until(lambda: all(each.service_is_ready() for each in clients), STATUS_SEC)
-        calls = [each.call_async(Trigger.Request()) for each in clients]
+        calls: list[list[Any]] = [[] for _ in clients]
         deadline = time.monotonic() + STATUS_SEC
-        for call in calls:
-            self.executor.spin_until_future_complete(call, max(0.0, deadline - time.monotonic()))
+        while (now := time.monotonic()) < deadline and not all(map(_first_answer, calls)):
+            # An answer is lost if the server has not discovered this client yet: ask again.
+            for client, asked in zip(clients, calls, strict=True):
+                if _first_answer(asked) is None:
+                    asked.append(client.call_async(Trigger.Request()))
+            end = min(now + _ASK_AGAIN_SEC, deadline)
+            for asked in calls:
+                remaining_sec = max(0.0, end - time.monotonic())
+                self.executor.spin_until_future_complete(asked[-1], remaining_sec)
         for client in clients:
             self.node.destroy_client(client)
-        return [call.result().message if call.done() else None for call in calls]
+        answers = map(_first_answer, calls)
+        return [None if answer is None else answer.message for answer in answers]
 
     def list_services(self) -> list[str]:
         """Return the full names of all services on the graph."""
         return [name for name, _ in self.node.get_service_names_and_types()]
+
+
+def _first_answer(calls: Sequence[Any]) -> Any:
+    """Return the first answer to one of several calls of a service, `None` if there is none."""
+    return next((call.result() for call in calls if call.done()), None)
 
 
 def wait_until(condition: Callable[[], bool], timeout_sec: float) -> bool:

@@ -1,0 +1,54 @@
+"""A command finds what a system has, also if an answer is lost on the way."""
+
+import json
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from composer.application.ask import restart
+from composer.application.running_systems.client import Client
+from composer.application.running_systems.discovery import Discovery
+from composer.errors import ComposerError
+from composer.runtime.control import protocol
+from tests.application.running_systems.test_answer_forms import STATUS_ANSWER
+
+pytestmark = pytest.mark.ros
+
+
+def answer_status(peer, name, *, after):
+    """Answer each but the first calls of a system's status; return the list of all calls."""
+    from rclpy.callback_groups import ReentrantCallbackGroup
+    from rclpy.task import Future
+    from std_srvs.srv import Trigger
+
+    calls = []
+
+    async def answer(request, response):
+        calls.append(request)
+        if len(calls) <= after:
+            # As an answer that is lost because its client is not known to the server yet.
+            await Future()
+        response.message = json.dumps(STATUS_ANSWER | {'name': name})
+        return response
+
+    service = f'/{protocol.node_name(name)}/{protocol.STATUS}'
+    group = ReentrantCallbackGroup()
+    peer.run(peer.node.create_service, Trigger, service, answer, callback_group=group)
+    return calls
+
+
+def test_a_status_whose_answer_is_lost_is_asked_for_again(peer):
+    calls = answer_status(peer, 'arm', after=1)
+    with Client() as client:
+        assert Discovery(client).find('arm').status['nodes'] == ['/a']
+    assert len(calls) >= 2
+
+
+def test_a_system_that_does_not_answer_may_have_the_node(peer):
+    answer_status(peer, 'arm', after=1000)
+    with pytest.raises(ComposerError) as error:
+        restart('stuck')
+    assert (
+        str(error.value) == "no system that answers has a node 'stuck', and 'arm' does not answer"
+    )
