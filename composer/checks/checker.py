@@ -117,17 +117,13 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_crossing_messages,
     check_shared_objects,
 )
-# These look at the computer that the system runs on.
-_LOCAL_RULES = {
-    *NODE_RULES,
-    *(check_executables, check_launch_files, check_parameter_files, check_start_values),
-    check_environment,
-}
+# These look for the programs of processes, and for files.
+_PROGRAM_RULES = {check_executables, check_launch_files, check_parameter_files}
 # These look at the computer that the system runs on, or at a node alone.
 _LOCAL_RULES = {
     *NODE_RULES,
-    *(check_executables, check_launch_files, check_parameter_files, check_start_values),
-    check_environment,
+    *_PROGRAM_RULES,
+    *(check_start_values, check_environment),
 }
 # One more than is shown, as a sign that there are more.
 _ENOUGH = MAX_FINDINGS + 1
@@ -156,15 +152,22 @@ def create_context(
 
 
 def check_system(
-    system: LoadedSystem, catalogue: InterfaceCatalogue, further: FurtherChecks | None = None
+    system: LoadedSystem,
+    catalogue: InterfaceCatalogue,
+    further: FurtherChecks | None = None,
+    *,
+    is_simulated: bool = False,
 ) -> list[Diagnostic]:
     """Return the findings in a system, by their places in the file.
 
     Args:
+        is_simulated: Whether external processes are left out: their programs and files need not
+            be here.
         further: Checks to apply after the others, by what they need; each gets the findings so
             far.
     """
-    return check_in_context(system, create_context(system, catalogue), further)
+    context = create_context(system, catalogue)
+    return check_in_context(system, context, further, is_simulated=is_simulated)
 
 
 def check_in_context(
@@ -172,6 +175,8 @@ def check_in_context(
     context: CheckContext | None,
     further: FurtherChecks | None = None,
     host: str = '',
+    *,
+    is_simulated: bool = False,
 ) -> list[Diagnostic]:
     """Return the findings in a system as `check_system` does, for a context that exists.
 
@@ -187,7 +192,7 @@ def check_in_context(
     if context:
         declared = context.interfaces.findings
         unchecked |= set() if context.catalogue.available else {'interfaces'}
-        found += _apply_rules(context, comments, host)
+        found += _apply_rules(context, comments, host, is_simulated=is_simulated)
     if context and further:
         samples = _by_line(system.sampled)
         for check in further.values():
@@ -214,12 +219,14 @@ def _identify(finding: Diagnostic) -> tuple[object, ...]:
 
 
 def _apply_rules(
-    context: CheckContext, comments: IgnoreComments, host: str
+    context: CheckContext, comments: IgnoreComments, host: str, *, is_simulated: bool
 ) -> Iterator[Diagnostic]:
     samples = _by_line(context.system.sampled)
+    simulated = replace(context, spec=replace(context.spec, processes={}))
     part = context.on_host(host) if host else None
     for rule in (*NODE_RULES, *SYSTEM_RULES):
-        found = _apply(rule, context, samples, comments)
+        is_left_out = is_simulated and rule in _PROGRAM_RULES
+        found = _apply(rule, simulated if is_left_out else context, samples, comments)
         if part is None:
             yield from found
         elif rule in _LOCAL_RULES:

@@ -168,7 +168,8 @@ def _format(value: Any) -> str:
 
 
 def _refuse_errors(system: LoadedSystem) -> None:
-    errors = [each for each in check_system(system, InterfaceCatalogue()) if has_errors([each])]
+    found = check_system(system, InterfaceCatalogue(), is_simulated=True)
+    errors = [each for each in found if has_errors([each])]
     if errors:
         shown = '\n\n'.join(map(render_finding, errors))
         message = f'the system has errors:\n{shown}'

@@ -39,7 +39,7 @@ def check_scenarios(loaded: LoadedScenarios, catalogue: InterfaceCatalogue) -> l
     unchecked = set(_UNCHECKED)
     if loaded.system is not None:
         context = create_context(loaded.system, catalogue)
-        found = check_in_context(loaded.system, context)
+        found = check_in_context(loaded.system, context, is_simulated=True)
         errors = [each for each in found if each.severity is Severity.ERROR]
         if context is not None and loaded.spec is not None:
             own += _check_cases(ScenarioContext(loaded, context, loaded.spec))

@@ -181,6 +181,26 @@ def test_the_errors_of_the_system_are_told(check, project):
     assert [(each.file, each.rule) for each in found] == [('robot.yaml', 'unknown-key')]
 
 
+# Processes whose programs and files are elsewhere, and one that is wrong anywhere.
+PROCESSES = {
+    '{package: rviz3, executable: rviz3}': [],
+    '{command: [sleep, "1"], cwd: "package://rviz3/x"}': [],
+    '{launch: rviz3/launch/all.launch.py}': [],
+    '{package: rviz3, executable: rviz3, parameter_files: [package://rviz3/x.yaml]}': [],
+    '{command: [sleep, "1"], nmae: x}': ['unknown-key'],
+}
+
+
+@pytest.mark.parametrize(('process', 'rules'), PROCESSES.items())
+def test_processes_need_no_programs_in_tests(check, project, process, rules):
+    system = f'version: 1\nnodes: {{robot: {{}}}}\nprocesses:\n  viewer: {process}\n'
+    (project / 'robot.yaml').write_text(system)
+    found = check(
+        'version: 1\nsystem: {file: robot.yaml}\ncases: {one: {then: [{exit_code: 0}], until: 1}}\n'
+    )
+    assert [each.rule for each in found] == rules
+
+
 def test_a_comment_silences_a_rule_in_its_line(check):
     text = """\
         version: 1
