@@ -73,6 +73,7 @@ class Run:
         self.decided = 0
         self.guards = 0
         self.broad_guards = 0
+        self.payload_guards = 0
         self.conditions = 0
         self.dead_branches = 0
         self.tried = 0
@@ -150,15 +151,19 @@ class Run:
             self.state_doubts += count if chosen == BY_STATE else 0
 
     @contextmanager
-    def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
+    def guard(
+        self, *, is_guard: bool, is_broad: bool = False, is_of_payloads: bool = False
+    ) -> Iterator[None]:
         """Note what is read meanwhile as guarded, if it is."""
         self.guards += is_guard
         self.broad_guards += is_broad
+        self.payload_guards += is_of_payloads
         try:
             yield
         finally:
             self.guards -= is_guard
             self.broad_guards -= is_broad
+            self.payload_guards -= is_of_payloads
 
     @contextmanager
     def of_other_types(self, *, is_other: bool) -> Iterator[None]:
@@ -208,6 +213,7 @@ class Run:
         *,
         used_at: Place | None = None,
         is_harm: bool = False,
+        is_of_payload: bool = False,
     ) -> None:
         """Note a problem, unless the behaviour is ready for it.
 
@@ -217,8 +223,11 @@ class Run:
         Args:
             used_at: Where the value is used that `place` wrote.
             is_harm: Whether it harms wherever it may be reached: nothing is raised.
+            is_of_payload: Whether it is a field that a payload can never have: only who expects
+                that is ready for it.
         """
-        if self.is_silent or ((self.guards or self.broad_guards) and not is_harm):
+        guards = self.payload_guards if is_of_payload else self.guards or self.broad_guards
+        if self.is_silent or (guards and not is_harm):
             self.tried += 1
             return
         if self._other_types and rule == 'unknown-field':

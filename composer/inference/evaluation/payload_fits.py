@@ -141,7 +141,12 @@ class Payloads(Part):
 
     def _report(self, misfit: Misfit, place: Place) -> None:
         self._evaluator.run.report(
-            misfit.rule, misfit.place, misfit.message, misfit.help, used_at=misfit.used_at or place
+            misfit.rule,
+            misfit.place,
+            misfit.message,
+            misfit.help,
+            used_at=misfit.used_at or place,
+            is_of_payload=misfit.rule == 'unknown-field',
         )
 
     def fits(self, type_name: str | None, value: Value, place: Place) -> bool:

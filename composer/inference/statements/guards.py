@@ -31,6 +31,7 @@ _CATCHING = {
     'UndeclaredParameterError',
     'ValueError',
 }
+_CATCHING_PAYLOADS = {'ComposerError', 'PayloadError'}
 _CATCHING_ALL = {'BaseException', 'Exception'}
 # Statements of a handler that say that nothing is to be done.
 _DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
@@ -47,7 +48,10 @@ class Guards(Part):
         tried = run.tried
         # It may be left before its end.
         doubt = run.condition() if node.handlers else nullcontext()
-        with run.guard(is_guard=is_guard, is_broad=is_broad), doubt:
+        kinds = (handler.type for handler in node.handlers if handler.type is not None)
+        is_of_payloads = any(_names_in(kind) & _CATCHING_PAYLOADS for kind in kinds)
+        guard = run.guard(is_guard=is_guard, is_broad=is_broad, is_of_payloads=is_of_payloads)
+        with guard, doubt:
             self._evaluator.statements.follow_all(node.body, scope)
         after = scope.names
         if after is not None:
@@ -86,6 +90,9 @@ class Guards(Part):
         locks = ExitStack()
         managers: list[Value] = []
         is_guard = False
+        is_of_payloads = any(
+            _names_in(each.context_expr) & _CATCHING_PAYLOADS for each in node.items
+        )
         for item in node.items:
             is_call = isinstance(item.context_expr, ast.Call) and isinstance(node, ast.AsyncWith)
             value = (
@@ -104,7 +111,7 @@ class Guards(Part):
         # What objects do at the end of it, they do on whatever the body raises.
         results = [self._evaluator.left(each) for each in managers]
         is_guard |= any(each is not None and truth_of(each) is not False for each in results)
-        with locks, self._evaluator.run.guard(is_guard=is_guard):
+        with locks, self._evaluator.run.guard(is_guard=is_guard, is_of_payloads=is_of_payloads):
             self._evaluator.statements.follow_all(node.body, scope)
         if is_guard:
             scope.names = join_names([before, scope.names])

@@ -354,9 +354,12 @@ WRONG = {
     'if node.parameters.speed > 1: node.parameters.speed = 1.0': 'unset-parameter',
     'm': 'no-effect',
     'print(mesage)': 'undefined-name',
+    "try: node.publish('command', {'lat': 1.0})\nexcept ValueError: print()": 'unknown-field',
+    "try: node.publish('command', {'lat': 1.0})\nexcept Exception: print()": 'unknown-field',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
 RIGHT = [
+    "from composer import PayloadError\ntry: node.publish('command', {'lat': 1.0})\nexcept PayloadError: print()",
     'print(Turn(linear={}, angul={}).angul)',
     'keeper = Keeper(node); keeper.speed = 1; print(keeper.speed)',
     'keeper = Keeper(node); setattr(keeper, m.child_frame_id, 1); print(keeper.speed)',
