@@ -101,10 +101,10 @@ def compute_environment_key(prefixes: Iterable[Path]) -> str:
     """Compute the key of the ROS, the Python and the Composer that packages are built for.
 
     Args:
-        prefixes: where ROS is installed.
+        prefixes: where ROS is installed, and other workspaces.
     """
     prefixes = tuple(prefixes)
-    parts = [str(BUILDER_FORMAT), EXTENSION_SUFFIXES[0], _numpy_version(), *map(str, prefixes)]
+    parts = [str(BUILDER_FORMAT), EXTENSION_SUFFIXES[0], _numpy_version()]
     return _hash([*parts, *(_package_version(name, prefixes) for name in _VERSIONED_PACKAGES)])
 
 
@@ -252,10 +252,13 @@ def _numpy_version() -> str:
 
 
 def _package_version(package: str, prefixes: Iterable[Path]) -> str:
-    """Return the manifest of a package, which has its version; an empty text if it is missing."""
+    """Return where a package is, and its manifest, which has its version; or an empty text.
+
+    Built libraries name the folders of those that they use. Other workspaces change nothing.
+    """
     for prefix in prefixes:
         if text := _read_text(prefix / 'share' / package / 'package.xml'):
-            return text
+            return f'{prefix}\n{text}'
     return ''
 
 

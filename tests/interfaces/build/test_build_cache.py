@@ -184,7 +184,11 @@ def test_of_several_builds_the_last_used_is_listed(home: Path) -> None:
 
     place = use('robots-1')
     assert list_built([]) == {'robots': place}
-    assert list_built([Path('/other/ros')]) == {}
+    manifest = home / 'ros/share/rclpy/package.xml'
+    manifest.parent.mkdir(parents=True)
+    manifest.write_text('<version>99.0.0</version>')
+    assert list_built([home / 'workspace']) == {'robots': place}
+    assert list_built([home / 'ros']) == {}
     later = use('robots-2')
     use('robots-3', 'another ROS')
     os.truncate(use('others-1') / 'file', 0)
@@ -236,6 +240,12 @@ def test_another_release_of_ros_or_of_a_used_package_makes_another_key(
 ) -> None:
     prefixes = [tmp_path, *ament_prefixes()]
     before = compute_key(definitions, prefixes, {})
+    # A workspace that has nothing to do with it changes nothing.
+    unrelated = tmp_path / 'other' / 'share' / 'unrelated' / 'package.xml'
+    unrelated.parent.mkdir(parents=True)
+    unrelated.write_text('<version>1.0.0</version>')
+    assert compute_key(definitions, [tmp_path / 'other', *prefixes], {}) == before
+    assert compute_key(definitions, prefixes[1:], {}) == before
     manifest = tmp_path / 'share' / package / 'package.xml'
     manifest.parent.mkdir(parents=True)
     manifest.write_text('<version>99.0.0</version>')
