@@ -29,14 +29,23 @@ def is_known(context: ScenarioContext, kind: ChannelKind, name: str) -> bool:
 
 
 def explain_unknown(
-    context: ScenarioContext, kind: ChannelKind, name: str, path: DataPath
+    context: ScenarioContext, kind: ChannelKind, name: str, path: DataPath, case: str = ''
 ) -> Diagnostic:
-    """Return the finding for a name that the system does not have."""
+    """Return the finding for a name that the system does not have.
+
+    Args:
+        case: When it may be there all the same, and only its type is missing.
+    """
+    meant = context.suggest_channel(kind, name)
+    if case:
+        is_near = (meant or '').startswith('did you mean')
+        advice = f"write its 'type' if {case}"
+        meant = f'{meant} Otherwise {advice}' if is_near else advice
     return context.at_value(
         path,
         'unknown-topic',
         f"the system has no {kind} '{name}'",
-        help=context.suggest_channel(kind, name),
+        help=meant,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from composer.interfaces.descriptions import MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.scenarios.checks.channels_of_cases import (
+    check_type,
     explain_left_out,
     explain_unknown,
     is_known,
@@ -85,7 +86,8 @@ def _check_pattern(
     context: ScenarioContext, case: CaseSpec, topic: str, path: DataPath
 ) -> Iterator[Diagnostic]:
     yield from _check_publisher(context, case, topic, path)
-    description = part_of(context, 'topic', topic, 'message', None)
+    given = value_at(context, (*path, 'type'))
+    description = part_of(context, 'topic', topic, 'message', given)
     for key in _CONDITIONS:
         yield from check_condition(context, description, (*path, key))
     yield from check_message(context, description, (*path, 'message'))
@@ -94,14 +96,17 @@ def _check_pattern(
 def _check_publisher(
     context: ScenarioContext, case: CaseSpec, topic: str, path: DataPath
 ) -> Iterator[Diagnostic]:
-    """Check that somebody publishes on a topic: a node, or the case itself."""
+    """Check that somebody publishes on a topic: a node, the case itself, or a library."""
     at = (*path, 'topic')
+    yield from check_type(context, 'topic', topic, path)
+    if value_at(context, (*path, 'type')):
+        return
     if context.has_own_end('topic', topic, provides=True) or context.is_of_ros('topic', topic):
         return
     if publishes_itself(case, topic):
         return
     if not is_known(context, 'topic', topic):
-        yield explain_unknown(context, 'topic', topic, at)
+        yield explain_unknown(context, 'topic', topic, at, 'a library publishes it with node.ros')
         return
     message = f"no node of this system publishes '{topic}'"
     help_text = explain_left_out(context, 'topic', topic, provides=True)

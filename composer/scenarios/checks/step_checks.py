@@ -38,15 +38,7 @@ def _check_publish(
     path = (*step.path, 'publish')
     if step.type is None and context.type_of('topic', step.topic) is None:
         if not context.channel('topic', step.topic):
-            unknown = explain_unknown(context, 'topic', step.topic, path)
-            near = (unknown.help or '').startswith('did you mean')
-            advice = "write its 'type' if it is none of the system's"
-            yield context.at_value(
-                path,
-                unknown.rule,
-                unknown.message,
-                help=f'{unknown.help} Otherwise {advice}' if near else advice,
-            )
+            yield explain_unknown(context, 'topic', step.topic, path, "it is none of the system's")
         return
     yield from check_type(context, 'topic', step.topic, step.path)
     if not context.has_own_end('topic', step.topic, provides=False):

@@ -179,3 +179,26 @@ def test_a_signal_ends_all_and_leaves_nothing_behind(project, wait_for, number, 
         assert not (left if number == signal.SIGKILL else list(temporary.iterdir()))
     finally:
         process.kill()
+
+
+LIBRARY = """
+    from std_msgs.msg import String
+
+    def begin(node):
+        publisher = node.ros.create_publisher(String, 'status', 10)
+        node.state.timer = node.ros.create_timer(
+            1.0, lambda: publisher.publish(String(data='well'))
+        )
+"""
+
+
+def test_what_a_library_publishes_can_be_expected_by_its_type(project, run_json):
+    project.write('library.py', LIBRARY)
+    system = 'version: 1\nnodes: {n: {on_start: "library:begin"}}\nprocesses: {v: {package: none, executable: none}}\n'
+    project.write('library.yaml', system)
+    given = 'topic: /status, type: std_msgs/msg/String, message'
+    cases = f'well: {{then: [{{{given}: well}}], until: 3}}\n  ill: {{then: [{{{given}: ill}}], until: 3}}'
+    text = f'version: 1\nsystem: {{file: library.yaml}}\ncases:\n  {cases}\n'
+    project.write('library.scenario.yaml', text)
+    _, report = run_json('library.scenario.yaml')
+    assert [case['outcome'] for case in report['cases']] == ['passed', 'failed']

@@ -25,6 +25,8 @@ RIGHT = [
     {'then': '{topic: /speed, message: {linear: {x: 1}}, count: [1, 2]}'},
     {'then': '{topic: /scan}', 'when': '{publish: /scan}'},
     {'then': '{topic: /rosout, never: true}'},
+    {'then': '{topic: /lib, type: std_msgs/msg/String, where: data, count: 1}, {topic: /scan, type: sensor_msgs/msg/LaserScan}'},
+    {'then': '{order: [{topic: /lib, type: std_msgs/msg/String, message: {data: x}}, {topic: /speed}]}'},
     *({'when': step, 'then': ''} for step in (
         '{call: /reset}', '{send_goal: /count}', '{set_parameters: {robot: {limit: 2}}}')),
     {'then': '{order: [{topic: speed}, {topic: /speed, where: "linear.x > 0"}]}'},
@@ -70,7 +72,10 @@ WRONG = [
     ({'given': '{services: {/dokc: {}}}'},
      "/dokc unknown-topic: the system has no service '/dokc' (did you mean '/dock'?)"),
     ({'then': '{topic: /sped}'},
-     "/sped unknown-topic: the system has no topic '/sped' (did you mean '/speed'?)"),
+     "/sped unknown-topic: the system has no topic '/sped' (did you mean '/speed'? "
+     "Otherwise write its 'type' if a library publishes it with node.ros)"),
+    ({'then': '{topic: /lib}'}, "/lib unknown-topic: the system has no topic '/lib' "
+     "(write its 'type' if a library publishes it with node.ros)"),
     ({'then': '{topic: /scan}'}, "/scan no-publisher: no node of this system publishes '/scan'"),
     ({'then': '{topic: /image}'}, "/image no-publisher: no node of this system publishes '/image' "
      "(process 'camera' does, but external processes are left out)"),
