@@ -33,6 +33,8 @@ def end_at_signals() -> None:
 
     Those that came while a system started again in this process have waited.
     """
+    # A launcher that wants no zombies ignores it, and no exit code of a child is known then.
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     for number in HANDLED:
         if signal.getsignal(number) is not signal.SIG_IGN:
             previous[number] = signal.signal(number, _handle)

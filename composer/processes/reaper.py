@@ -334,6 +334,8 @@ def main() -> None:
     # Composer decides when to end; a signal to its whole process group comes here, too.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    # Ignored, it would have the kernel reap what is waited for here.
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     _, hard = resource.getrlimit(_RLIMIT_LOCKS)
     resource.setrlimit(_RLIMIT_LOCKS, (hard, hard))

@@ -101,6 +101,8 @@ def main(descriptor: int) -> None:
     """Serve the connection that this process was started with."""
     # The caller decides what Ctrl-C means; it closes the connection.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # As for a command; pytest leaves it as it was.
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     # Threads of C libraries, which live on in no child, are none that hold locks of Python.
     warnings.filterwarnings('ignore', 'This process .* is multi-threaded', DeprecationWarning)
     connection = Connection(descriptor)
