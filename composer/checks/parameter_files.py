@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import full_name
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
+from composer.checks.process_parameters import LEAVE_OUT, NO_TYPE
 from composer.diagnostics import Related, diagnostic_at
 from composer.input_limits import MAX_VALUES
 from composer.language.parameter_files import read_given_file, values_given
@@ -20,7 +21,7 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import ComponentSpec, NodeSpec, ProcessSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
-from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern
+from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern, matches_pattern
 from composer.spelling import count_edits, did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ def _check_contents(
                 yield from _check_names(file, of_file, takers)
             yield from _check_entries(path, file, takers)
     yield from _check_values(context, users)
+    yield from _check_empty_lists(library, users)
 
 
 class _Library:
@@ -407,6 +409,28 @@ def _check_values(context: CheckContext, users: Iterable[_User]) -> Iterator[Dia
                 help=help_text,
                 related=[context.related(declared.path, 'declared here')] if declared else [],
             )
+
+
+def _check_empty_lists(library: _Library, users: list[_User]) -> Iterator[Diagnostic]:
+    """Yield the empty lists that nodes of programs and components get."""
+    known = [user.full_name for user in users if user.full_name]
+    for user in users:
+        if isinstance(user.node, NodeSpec) or not user.is_run:
+            continue
+        entries = [entry for file in user.files for entry in library.files[file].entries]
+        for entry in user.overrides.values() if user.full_name else entries:
+            # Nodes that nobody knows have the names that no others have.
+            if entry.value == [] and (
+                user.full_name
+                or entry.pattern == '/**'
+                or not any(matches_pattern(entry.pattern, name) for name in known)
+            ):
+                yield diagnostic_at(
+                    entry.value_span,
+                    'refused-parameter',
+                    f"parameter '{entry.name}': {NO_TYPE}",
+                    help=LEAVE_OUT,
+                )
 
 
 def _find_problem(

@@ -15,6 +15,7 @@ from composer.checks.parameters import (
     find_refusal,
     warn_of_texts_for_bools,
 )
+from composer.language.specs import ProcessSpec
 from composer.names import find_parameter_name_problem, with_article
 from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
@@ -28,12 +29,15 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import ComponentSpec, ParameterSpec, ProcessSpec
+    from composer.language.specs import ComponentSpec, ParameterSpec
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
 # Parameters with which ROS changes the QoS of a publisher or subscription.
 _OVERRIDES = 'qos_overrides.'
+NO_TYPE = 'an empty list has no type here, and ends nodes of rclcpp'
+LEAVE_OUT = 'leave it out: the node then keeps its own default'
+_WITH_TYPE = 'write {default: [], type: string_array}, with the type that is meant'
 _NO_NULL = 'there is no value, and ROS has no null'
 
 
@@ -44,6 +48,7 @@ def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
         given: dict[str, DataPath] = {}
         yield from _check_mapping(context, component.parameters, path, '', given)
         yield from _check_texts(context, component, given.values())
+        yield from _check_types(context, component, given, component.types)
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
         seen: dict[str, DataPath] = {}
@@ -51,6 +56,13 @@ def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
         declared = {name for node in process.nodes for name in node.parameters}
         open_places = [at for name, at in seen.items() if name not in declared]
         yield from _check_texts(context, process, open_places)
+        types = {
+            name: parameter.type
+            for node in process.nodes
+            for name, parameter in node.parameters.items()
+            if parameter.path == seen.get(name)
+        }
+        yield from _check_types(context, process, seen, types)
         if process.nodes:
             yield from _compare_with_declared(context, process, seen)
 
@@ -60,6 +72,30 @@ def _check_texts(
 ) -> Iterator[Diagnostic]:
     for path in places:
         yield from warn_of_texts_for_bools(context, _value_at(owner, path), path)
+
+
+def _check_types(
+    context: CheckContext,
+    owner: ProcessSpec | ComponentSpec,
+    places: Mapping[str, DataPath],
+    types: Mapping[str, str | None],
+) -> Iterator[Diagnostic]:
+    """Report values without a type: a process gets its parameters in a file.
+
+    Args:
+        types: The types that are declared.
+    """
+    is_file = isinstance(owner, ProcessSpec)
+    for name, path in places.items():
+        if is_file and types.get(name) == 'byte_array':
+            what, advice = 'a process gets a parameter file, which has no byte type', LEAVE_OUT
+        elif _value_at(owner, path) == [] and (is_file or name not in types):
+            what, advice = NO_TYPE, LEAVE_OUT if is_file else _WITH_TYPE
+        else:
+            continue
+        inner = (*path, 'default')
+        at = inner if inner in context.system.positions.values else path
+        yield context.at_value(at, _RULE, f"parameter '{name}': {what}", help=advice)
 
 
 def _value_at(owner: ProcessSpec | ComponentSpec, path: DataPath) -> Any:

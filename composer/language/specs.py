@@ -416,6 +416,7 @@ class ComponentSpec:
         package: The ROS package of the plugin.
         plugin: The class, as in `image_proc::RectifyNode`.
         remap: Rules, from and to; the first that matches wins.
+        types: Those of the parameters that are declared.
         intra_process: Whether messages within the container are handed over.
         lifecycle: The state that it is brought to; `None` to leave it alone.
         container: The name of the container.
@@ -427,6 +428,7 @@ class ComponentSpec:
     package: str
     plugin: str
     parameters: Mapping[str, Any]
+    types: Mapping[str, str]
     parameter_files: tuple[ParameterFileSpec, ...]
     remap: tuple[tuple[str, str], ...]
     log_level: LogLevel | None

@@ -5,6 +5,7 @@ from textwrap import dedent, indent
 import pytest
 
 from composer.checks.checker import check_system
+from composer.checks.process_parameters import LEAVE_OUT, NO_TYPE
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 
@@ -303,6 +304,24 @@ def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
     assert [line.split(': ')[0] for line in check(nodes, more=more, p=text)] == [
         'p.yaml:1:52 bad-parameter-file'
     ]
+
+
+@pytest.mark.parametrize(
+    ('pattern', 'is_error'),
+    [('/**', True), ('lidar', True), ('/other', True), ('/arm', False)],
+)
+def test_an_empty_list_is_for_nodes_of_the_system_alone(check, pattern, is_error):
+    more = """
+        processes:
+          driver: {command: [sleep], parameter_files: [p.yaml]}
+        """
+    nodes = '  arm: {parameter_files: [p.yaml], parameters: {a: {type: string_array}}}\n'
+    text = f'/arm: {{ros__parameters: {{a: [b]}}}}\n{pattern}: {{ros__parameters: {{a: []}}}}\n'
+    found = [line for line in check(nodes, more=more, p=text) if 'unmatched' not in line]
+    told = (
+        f"p.yaml:2:{len(pattern) + 25} refused-parameter: parameter 'a': {NO_TYPE} → {LEAVE_OUT}"
+    )
+    assert found == [told] * is_error
 
 
 def test_the_name_of_a_programs_node_is_matched(check):

@@ -3,6 +3,7 @@
 import pytest
 
 from composer.checks.checker import check_system
+from composer.checks.process_parameters import NO_TYPE
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system_text
 
@@ -46,11 +47,40 @@ def findings(parameters):
             "parameter 'f.g': the mapping is empty, and ROS misreads what follows one",
         ),
         ('f.g: 1, f: {g: 2}', "the parameter 'f.g' is given twice"),
+        ('f: {g: []}', f"parameter 'f.g': {NO_TYPE}"),
+        ('f: {type: string_array, default: []}', f"parameter 'f': {NO_TYPE}"),
+        (
+            'f: {type: byte_array, default: [1]}',
+            "parameter 'f': a process gets a parameter file, which has no byte type",
+        ),
     ],
 )
 def test_what_ros_refuses_or_misreads_is_a_finding(parameters, finding):
     assert [(rule, message) for rule, _, message in findings(parameters)] == [
         ('bad-parameter', finding)
+    ]
+
+
+def test_a_component_gets_typed_empty_lists_and_bytes():
+    system = load_system_text("""
+version: 1
+containers:
+  eyes:
+    command: ['true']
+    components:
+      eye:
+        package: p
+        plugin: p::Eye
+        parameters:
+          a: {type: double_array, default: []}
+          b: {type: byte_array, default: [1]}
+          c: {type: byte_array, default: [256]}
+          d: []
+""")
+    found = check_system(system, InterfaceCatalogue())
+    assert [each.message for each in found if each.rule == 'bad-parameter'] == [
+        "parameter 'c': item 0: expected a byte (0 to 255), got 256",
+        f"parameter 'd': {NO_TYPE}",
     ]
 
 
@@ -73,7 +103,7 @@ def test_what_is_left_out_is_checked_too():
 @pytest.mark.parametrize(
     'parameters',
     [
-        'f: []',
+        'f: {type: string_array}',
         'f: [1, 2.5, 100000000000000000000]',
         'f: .inf, g: -9223372036854775808, h: [true, false]',
         "f: {g: {h: ''}, i: [a, '1']}, j.k: 1, j: {l: 2}",

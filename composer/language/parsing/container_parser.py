@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.language.parameter_files import parse_parameter_files
 from composer.language.parsing.condition_parser import parse_conditions
-from composer.language.parsing.declared_ends import given_values, parse_own_ends
+from composer.language.parsing.declared_ends import given_types, given_values, parse_own_ends
 from composer.language.specs import ComponentSpec, DeclaredNodeSpec
 from composer.names import expand_namespace
 
@@ -113,6 +113,7 @@ def _parse_component(
         package=data['package'],
         plugin=data['plugin'],
         parameters=MappingProxyType(given_values(data.get('parameters', {}))),
+        types=MappingProxyType(given_types(data.get('parameters', {}))),
         parameter_files=parse_parameter_files(data),
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),

@@ -49,6 +49,11 @@ def given_values(parameters: Data) -> Data:
     return given
 
 
+def given_types(parameters: Data) -> Mapping[str, str]:
+    """Return the types of the declarations among the parameters of a process or component."""
+    return {name: value['type'] for name, value in parameters.items() if is_declaration(value)}
+
+
 def parse_declared_nodes(
     process: str, data: Data, path: DataPath
 ) -> tuple[tuple[DeclaredNodeSpec, ...], bool]:

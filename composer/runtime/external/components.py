@@ -338,12 +338,11 @@ def _write_request(component: ComponentSpec, entries: Mapping[str, Any]) -> Any:
     """
     from composition_interfaces.srv import LoadNode
 
-    given = dict(_flatten(component.parameters))
     parameters = [
-        Parameter(name, value=convert_parameter_value(value, type_name))
-        for name, value in given.items()
-        # An empty list has no type.
-        if name not in entries and (type_name := infer_parameter_type(value)) is not None
+        _typed(name, type_name, value)
+        for name, value in _flatten(component.parameters)
+        if name not in entries
+        and (type_name := component.types.get(name) or infer_parameter_type(value)) is not None
     ]
     parameters += [
         Parameter(name, Parameter.Type[entry.type.upper()], entry.value)
@@ -363,6 +362,13 @@ def _write_request(component: ComponentSpec, entries: Mapping[str, Any]) -> Any:
         parameters=[each.to_parameter_msg() for each in parameters],
         extra_arguments=[each.to_parameter_msg() for each in extra],
     )
+
+
+def _typed(name: str, type_name: str, value: Any) -> Parameter:
+    if type_name == 'byte_array':
+        value = [bytes([item]) for item in value]
+    kind = Parameter.Type[type_name.upper()]
+    return Parameter(name, kind, convert_parameter_value(value, type_name))
 
 
 def _flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:

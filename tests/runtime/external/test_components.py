@@ -114,6 +114,25 @@ def test_components_are_loaded_and_loaded_again(compose, peer, wait_for, listed)
     assert child.stop() == 0
 
 
+def test_a_component_gets_values_of_the_types_that_are_declared(compose, peer, wait_for):
+    words = {
+        'bytes': ({'type': 'byte_array', 'default': [1, 255]}, r"[b'\x01', b'\xff']"),
+        'nothing': ({'type': 'string_array', 'default': []}, '[]'),
+        'whole': ({'type': 'double', 'default': 2}, '2.0'),
+    }
+    components = {
+        name: component(namespace=name, parameters={'word': declared})
+        for name, (declared, _) in words.items()
+    }
+    heard = {name: peer.listen(String, f'/{name}/chatter') for name in words}
+    child = compose(system({'perception': container(components)}))
+    child.wait_until_ready()
+    for name, (_, text) in words.items():
+        wait_for(lambda name=name: heard[name], f'the word of {name}')
+        assert heard[name][0].data == text
+    assert child.stop() == 0
+
+
 FAILURES = {
     'plugin': ({'it': component('Tlaker')}, 'Failed to find class with the requested plugin'),
     'package': (
