@@ -21,6 +21,8 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.specs import ComponentSpec, NodeSpec, ProcessSpec
 from composer.names import find_namespace_problem, find_node_name_problem, join_names, with_article
 from composer.records import record
+from composer.ros_parameters.file_reader import parse_parameter_file
+from composer.ros_parameters.file_writer import render_parameters_for_all
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern, matches_pattern
 from composer.spelling import count_edits, did_you_mean, find_nearest, suggest
 
@@ -101,21 +103,21 @@ class _Library:
         self.findings: list[Diagnostic] = []
         # Where values in the files depend on samples.
         self.sampled: set[tuple[str, int, int]] = set()
-        self._context = context
+        self.context = context
         self._values_left = MAX_VALUES
 
     def read(self, owner: NodeSpec | ProcessSpec | ComponentSpec) -> Iterator[ParameterFileSpec]:
         """Read the files of a node or process, and yield those that exist."""
         for index, file in enumerate(owner.parameter_files):
             at = (*owner.path, 'parameter_files', index)
-            if (*at, 'file') in self._context.system.positions.values:
+            if (*at, 'file') in self.context.system.positions.values:
                 self.findings += self._check_root(file, (*at, 'root'))
                 at = (*at, 'file')
             try:
                 path = str(resolve_path(file.file, Path()))
             except PathError as error:
                 self.findings.append(
-                    self._context.at_value(at, 'uninstalled-package', str(error), help=error.help)
+                    self.context.at_value(at, 'uninstalled-package', str(error), help=error.help)
                 )
                 continue
             if file not in self.files:
@@ -128,7 +130,7 @@ class _Library:
                 }
             unreadable = [each for each in self.files[file].findings if each.span is None]
             self.findings += [
-                self._context.at_value(
+                self.context.at_value(
                     at,
                     each.rule,
                     f'{path}: {each.message}',
@@ -142,11 +144,11 @@ class _Library:
     def _explain(self, path: Path, at: DataPath) -> str | None:
         if os.path.lexists(path):
             return None
-        return explain_absent(path, self._context.system.positions.value(at))
+        return explain_absent(path, self.context.system.positions.value(at))
 
     def _find_samples(self, file: ParameterFileSpec, path: DataPath) -> list[str]:
-        sampled = self._context.system.sampled
-        positions = self._context.system.positions
+        sampled = self.context.system.sampled
+        positions = self.context.system.positions
         at = (*path, 'expressions')
         names = values_given(file) or {}
         return [name for name in names if positions.values.get((*at, name)) in sampled]
@@ -154,13 +156,15 @@ class _Library:
     def _check_root(self, file: ParameterFileSpec, at: DataPath) -> Iterator[Diagnostic]:
         if problem := find_namespace_problem(file.root) if file.root.strip('/') else None:
             message = f"'{file.root}': {problem}"
-            yield self._context.at_value(at, 'bad-name', message)
+            yield self.context.at_value(at, 'bad-name', message)
 
-    def merge(self, files: tuple[ParameterFileSpec, ...]) -> MergedFiles:
-        """Return what files say together; they have been read."""
+    def merge(self, files: tuple[ParameterFileSpec, ...], *first: ParameterFile) -> MergedFiles:
+        """Return what files say together, after some others; they have been read."""
+        from composer.ros_parameters.overrides import MergedFiles
+
+        if first:
+            return MergedFiles([*first, *(self.files[file] for file in files)])
         if files not in self._merged:
-            from composer.ros_parameters.overrides import MergedFiles
-
             self._merged[files] = MergedFiles(self.files[file] for file in files)
         return self._merged[files]
 
@@ -176,6 +180,8 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
         if not files:
             continue
         nodes = _nodes_of(owner)
+        if not isinstance(owner, NodeSpec) and owner.parameters:
+            library.findings += _find_lost_values(library, owner, files, nodes)
         for name, node in nodes.items():
             overrides = library.merge(files).find_overrides(name) if name else {}
             may_have_others = isinstance(owner, ProcessSpec) and not _lists_nodes(owner)
@@ -197,6 +203,36 @@ def _nodes_of(
     for node in owner.nodes if _lists_nodes(owner) else ():
         nodes[node.full_name] = node if node.declares_all_parameters else None
     return nodes or {None: None}
+
+
+def _find_lost_values(
+    library: _Library,
+    owner: ProcessSpec | ComponentSpec,
+    files: tuple[ParameterFileSpec, ...],
+    names: Iterable[str | None],
+) -> Iterator[Diagnostic]:
+    """Yield the parameters of an owner that its files override for all of its nodes."""
+    own = parse_parameter_file(render_parameters_for_all(owner.parameters), owner.name)
+    merged = library.merge(files, own)
+    if isinstance(owner, ProcessSpec) and owner.node_name is not None and owner.namespace is None:
+        # Hardly any program has a namespace of its own.
+        names = [f'/{owner.node_name}']
+    for entry in own.entries:
+        winners = [(name, merged.find_overrides(name or '/_').get(entry.name)) for name in names]
+        lost_to = [
+            winner
+            for name, winner in winners
+            if winner and winner.value != entry.value and (name or winner.pattern == '/**')
+        ]
+        path = (*owner.path, 'parameters', *entry.keys)
+        if len(lost_to) == len(winners) and path in library.context.system.positions.keys:
+            yield library.context.at_key(
+                path,
+                'overridden-parameter',
+                f"'{entry.name}' never has this value: {lost_to[0].value_span.place} overrides it",
+                help="files override 'parameters': change it there, or remove it here",
+                related=[Related('overridden here', lost_to[0].value_span)],
+            )
 
 
 def _lists_nodes(process: ProcessSpec) -> bool:

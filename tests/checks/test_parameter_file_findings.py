@@ -307,6 +307,41 @@ def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
 
 
 @pytest.mark.parametrize(
+    ('keys', 'values', 'pattern', 'is_lost'),
+    [
+        ('name: lidar, ', 'port: a', 'lidar', True),
+        ('name: lidar, ', 'port: a', '/**', True),
+        ('', 'port: a', '/**', True),
+        ('', 'port: a', 'lidar', False),
+        ('nodes: [lidar], ', 'port: a', 'lidar', True),
+        ('nodes: [lidar, other], ', 'port: a', 'lidar', False),
+        ('name: lidar, ', 'port: {type: string, default: a}', '/*', True),
+        ('name: lidar, ', 'port: b', 'lidar', False),
+        # Of one name of nodes, integers come before texts.
+        ('name: lidar, ', 'port: 1', '/**', False),
+        ('name: lidar, ', 'port: 1', '/*', True),
+    ],
+)
+def test_a_parameter_of_a_program_that_its_file_overrides_is_a_warning(
+    check, keys, values, pattern, is_lost
+):
+    more = f"""
+        processes:
+          driver: {{command: [sleep], {keys}parameters: {{{values}}}, parameter_files: [p.yaml]}}
+        """
+    found = check('  arm: {}\n', more=more, p=f'{pattern}: {{ros__parameters: {{port: b}}}}')
+    place = f'system.yaml:6:{43 + len(keys)}'
+    assert (
+        found
+        == [
+            f"{place} overridden-parameter: 'port' never has this value: p.yaml:1 overrides it "
+            "→ files override 'parameters': change it there, or remove it here"
+        ]
+        * is_lost
+    )
+
+
+@pytest.mark.parametrize(
     ('pattern', 'is_error'),
     [('/**', True), ('lidar', True), ('/other', True), ('/arm', False)],
 )
