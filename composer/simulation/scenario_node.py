@@ -95,6 +95,11 @@ class ScenarioNode:
         self._made: dict[tuple[str, str], Any] = {}
         # Others may ask it before anything else has started.
         self._node.serve_at_once()
+        # A client that comes later gets the status of goals from a thread of the middleware, in
+        # real time: that is one more choice for a shuffle, or none.
+        for node in nodes.values():
+            for spec in node.spec.actions.values():
+                self._client_of(_resolve(node, spec, 'action'), spec.type)
 
     # Topics, services, actions
 
@@ -141,12 +146,15 @@ class ScenarioNode:
             GoalTimeoutError: It did not answer in time.
             GoalRejectedError: It refused the goal.
         """
-        name = _full(action)
-        client = self._made.get(('action_clients', name))
-        if client is None:
-            type_name = of_type or self._type_of(name, 'action', ('actions', 'action_clients'))
-            client = self._make('action_clients', {'type': type_name, 'action': name})
+        client = self._client_of(_full(action), of_type)
         return SimulatedGoal(client.send_goal({} if goal is None else goal, timeout))
+
+    def _client_of(self, action: str, of_type: str | None) -> Any:
+        client = self._made.get(('action_clients', action))
+        if client is None:
+            type_name = of_type or self._type_of(action, 'action', ('actions', 'action_clients'))
+            client = self._make('action_clients', {'type': type_name, 'action': action})
+        return client
 
     def serve(self, service: str, answer: Callable[[Any], Any], of_type: str | None) -> None:
         """Serve a service that the system calls: `answer` returns the payload of the response."""
