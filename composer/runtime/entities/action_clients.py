@@ -88,6 +88,7 @@ class ActionClient:
             text = f"the server of '{self._name}' refused the goal"
             raise GoalRejectedError(text)
         goal.begin(handle)
+        goal.servers = self._client.servers_outside()
         self._goals.add(goal)
         goal.result_future.add_done_callback(partial(self._take_result, goal))
         # Its server may have gone before it was one of the goals.
@@ -118,6 +119,16 @@ class ActionClient:
         """End the goals that were sent or accepted, if the server was killed."""
         if self._requests.lose():
             self._lose_goals(self._lost())
+
+    def check_servers(self) -> None:
+        """End the goals whose servers have left the graph: a new server does not know them."""
+        goals = [goal for goal in list(self._goals) if goal.servers]
+        if all(goal.result_future.done() for goal in goals):
+            return
+        servers = self._client.servers_outside()
+        for goal in goals:
+            if goal.servers.isdisjoint(servers):
+                goal.lose(self._lost())
 
     def _lost(self) -> ActionNotAvailableError:
         message = f"the action server '{self._name}' ended before the goal did"

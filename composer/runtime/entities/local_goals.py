@@ -15,6 +15,7 @@ from rclpy.executors import await_or_execute
 from rclpy.task import Future
 
 from composer.runtime.messages.ownership import ownership_of
+from composer.runtime.middleware.lost_participants import list_servers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -145,6 +146,12 @@ class GoalClient(ActionClient):
         # The second of its services: the first one is there by then, too.
         results = f'{self.local.key[0]}/_action/get_result'
         return super().server_is_ready() and not lost.have_all_servers(self._node, results)
+
+    def servers_outside(self) -> frozenset[bytes]:
+        """Return what identifies the servers in other processes; none if goals are handed over."""
+        if self.local.server is not None:
+            return frozenset()
+        return list_servers(self._node, f'{self.local.key[0]}/_action/get_result')
 
     def send_goal_async(
         self, goal: Any, feedback_callback: Any = None, goal_uuid: Any = None

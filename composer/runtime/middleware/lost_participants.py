@@ -70,6 +70,12 @@ class LostParticipants:
         return now - self._listed.setdefault(service, now) < _MATCH_SEC
 
 
+def list_servers(ros: Node, service: str) -> frozenset[bytes]:
+    """Return the GUIDs of what sends the responses of a service."""
+    ends = ros.get_publishers_info_by_topic(_RESPONSES.format(service), no_mangle=True)
+    return frozenset(bytes(end.endpoint_gid) for end in ends)
+
+
 def find_participants(ros: Node, nodes: Collection[str]) -> frozenset[bytes]:
     """Return the participants that have nodes of these full names."""
     return frozenset(each for full_name in nodes for each in _find_participants(ros, full_name))

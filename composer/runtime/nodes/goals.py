@@ -31,10 +31,12 @@ class Goal:
 
     Attributes:
         feedback_queue: The feedback that has come, then `None` when the goal has ended.
+        servers: What identifies the servers outside, one of which has it; empty for one in here.
     """
 
     def __init__(self, name: str, waits: Waits) -> None:
         self.feedback_queue: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.servers: frozenset[bytes] = frozenset()
         self._name = name
         self._waits = waits
         self._handle: Any = None
@@ -63,6 +65,8 @@ class Goal:
     def feedback(self) -> Iterator[Any]:
         """The feedback messages as they come, until the goal has ended; each comes once.
 
+        It ends, too, when the server has left the ROS graph; `result` raises then.
+
         Raises:
             SystemStoppingError: A stop was requested while it waited for the next one.
         """
@@ -87,7 +91,7 @@ class Goal:
 
         Raises:
             GoalTimeoutError: It did not end within `timeout` seconds.
-            ActionNotAvailableError: An edit took the action client away.
+            ActionNotAvailableError: The server ended, or an edit took the action client away.
             SystemStoppingError: A stop was requested while it waited.
         """
         if not self._waits.until_done(self.result_future, timeout):

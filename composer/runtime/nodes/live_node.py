@@ -395,6 +395,12 @@ class LiveNode:
                 client.lose_server()
         self.remote_parameters.lose_servers()
 
+    def check_servers(self) -> None:
+        """End the goals whose servers have left the graph."""
+        clients: dict[str, Any] = self.entities['action_clients']
+        for client in list(clients.values()):
+            client.check_servers()
+
     def destroy(self) -> None:
         """Remove the node and all its entities from the graph; a second time does nothing."""
         if self._is_destroyed:

@@ -3,6 +3,7 @@
 import signal
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -11,6 +12,7 @@ pytest.importorskip('test_msgs')
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor
 from test_msgs.action import Fibonacci
 
@@ -167,6 +169,7 @@ class PlainServer:
         rclpy.init(context=self.context, domain_id=domain_id)
         self.node = rclpy.create_node('plain', context=self.context, use_global_arguments=False)
         self._ended = threading.Event()
+        self._has_vanished = False
         self._server = ActionServer(
             self.node,
             Fibonacci,
@@ -181,12 +184,18 @@ class PlainServer:
         self._thread = threading.Thread(target=self._spin)
         self._thread.start()
 
+    def vanish(self):
+        """Leave the graph, and what it has begun undone."""
+        self._server.destroy()
+        self._has_vanished = True
+
     def close(self):
         self._ended.set()
         self._executor.wake()
         self._thread.join()
         self._executor.shutdown()
-        self._server.destroy()
+        if not self._has_vanished:
+            self._server.destroy()
         self.node.destroy_node()
         self.context.try_shutdown()
         self.context.destroy()
@@ -203,15 +212,18 @@ class PlainServer:
             if order % 2 and step == order:
                 goal.succeed()
                 return Fibonacci.Result(sequence=[order])
-            goal.publish_feedback(Fibonacci.Feedback(sequence=[step]))
+            with suppress(InvalidHandle):
+                goal.publish_feedback(Fibonacci.Feedback(sequence=[step]))
             step += 1
             time.sleep(0.02)
-        goal.abort()
+        with suppress(InvalidHandle):
+            goal.abort()
         return Fibonacci.Result()
 
     def _spin(self):
         while not self._ended.is_set():
-            self._executor.spin_once(timeout_sec=0.1)
+            with suppress(InvalidHandle):
+                self._executor.spin_once(timeout_sec=0.1)
 
 
 @pytest.fixture
@@ -238,6 +250,28 @@ def test_a_goal_of_a_plain_server_has_feedback_and_a_result(compose, plain_serve
 
     for name, end in ENDS.items():
         assert child.wait_for_line(f'[{name}]: end: ') == f'[INFO] [{name}]: {end}'
+    assert child.stop() == 0
+
+
+def test_a_goal_ends_when_its_server_has_gone(compose, plain_server):
+    child = compose(
+        acting('stay', client=", result: 'parts:take'"),
+        CODE
+        + """
+def stay(node):
+    goal = node.send_goal('act', {'order': 2}, timeout=30)
+    for feedback in goal.feedback:
+        if list(feedback.sequence) == [9]:
+            node.logger.info('feedback comes')
+    try:
+        goal.result()
+    except composer.ActionNotAvailableError as error:
+        node.logger.info(f'{goal.status}: {error}')
+""",
+    )
+    child.wait_for_line('feedback comes')
+    plain_server.vanish()
+    child.wait_for_line("[client]: unknown: the action server '/act' ended before the goal did")
     assert child.stop() == 0
 
 
