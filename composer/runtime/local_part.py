@@ -8,6 +8,8 @@ from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rclpy.exceptions import InvalidHandle
+
 from composer.errors import ExitCode
 from composer.planning.differences import compare
 from composer.processes.guardian_client import end_marked
@@ -24,6 +26,7 @@ from composer.runtime.health.watched_clocks import Clocks
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
+from composer.runtime.middleware.ros_graph import find_ends
 from composer.runtime.middleware.shared_memory import replacing_ports
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import SystemHandle
@@ -37,7 +40,7 @@ from composer.runtime.system_executor import SystemExecutor
 from composer.runtime.wait_for import find_hidden
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from rclpy.context import Context
     from rclpy.node import Node
@@ -143,7 +146,7 @@ class LocalPart:
         )
         if self._executor.runs_in_real_time:
             clocks = Clocks(self._find_ros_nodes, self.state, tells_steps=not worker)
-            observers = (clocks, *observers)
+            observers = (clocks, _LostServers(self._nodes), *observers)
         self._graph_watcher = GraphWatcher(
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints],
             lambda: self._any_ros,
@@ -341,6 +344,18 @@ class LocalPart:
         """Return the full names of the components that are loaded into its containers."""
         return self._programs.components.list_names()
 
+    def find_foreign_ends(self) -> list[tuple[str, str, str]]:
+        """Return the node, noun and name of each end of components and of named processes."""
+        ros = self._any_ros
+        if ros is None:
+            return []
+        processes = self._reading.spec.processes.values()
+        nodes = [
+            *self.list_components(),
+            *(name for each in processes for name in each.named_nodes),
+        ]
+        return [(node, *end) for node in dict.fromkeys(nodes) for end in find_ends(ros, node)]
+
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
         return find_deliveries(list(self._nodes.values()))
@@ -473,3 +488,16 @@ class LocalPart:
             )
         finally:
             self._stop_request.make(ExitCode.FAILED)
+
+
+class _LostServers:
+    """Ends what waits for servers of other programs, once these have left the graph."""
+
+    def __init__(self, nodes: Mapping[str, LiveNode]) -> None:
+        self._nodes = nodes
+
+    def check(self, _ros: Node) -> None:
+        """See `GraphObserver`."""
+        for node in list(self._nodes.values()):
+            with suppress(InvalidHandle):
+                node.check_servers()

@@ -11,7 +11,7 @@ from composer.runtime.control.protocol import VERSION
 from composer.runtime.health.system_state import Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from composer.planning.snapshot import Snapshot
     from composer.runtime.costs.process_costs import ProcessCosts
@@ -78,12 +78,16 @@ def status_answer(
 
 
 def describe_top(
-    state: SystemState, diagnostics: DiagnosticsPublisher, deliveries: Deliveries
+    state: SystemState,
+    diagnostics: DiagnosticsPublisher,
+    deliveries: Deliveries,
+    foreign: Iterable[tuple[str, str, str]],
 ) -> dict[str, Any]:
     """Return the health of each entity in the last period, and have more measured in the next.
 
     Args:
         deliveries: Which way publishers and clients deliver, which have no figures but a rate.
+        foreign: The node, noun and name of each end of other programs, which have no figures.
     """
     diagnostics.watch()
     latest = diagnostics.latest
@@ -98,7 +102,8 @@ def describe_top(
         + [
             _describe_figureless((node, Owner('lifecycle', each)), None, '')
             for node, each in state.find_lifecycles().items()
-        ],
+        ]
+        + [_describe_figureless((node, Owner(*end)), None, '') for node, *end in foreign],
     }
 
 

@@ -246,7 +246,9 @@ class ControlNode:
         """Return the health of the entities of this process; `None` if nothing is measured."""
         if self._diagnostics is None:
             return None
-        return describe_top(self._system.state, self._diagnostics, self._system.find_deliveries())
+        system = self._system
+        ends = system.find_foreign_ends()
+        return describe_top(system.state, self._diagnostics, system.find_deliveries(), ends)
 
     def _status(self) -> Outcome:
         workers = self._system.workers

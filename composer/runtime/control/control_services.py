@@ -58,6 +58,9 @@ class ControlledSystem(Protocol):
     def list_components(self) -> list[str]:
         """Return the full names of the components that are loaded into its containers."""
 
+    def find_foreign_ends(self) -> list[tuple[str, str, str]]:
+        """See `LocalPart`."""
+
     def find_deliveries(self) -> Deliveries:
         """Return which way the messages of each publisher and the calls of each client go."""
 

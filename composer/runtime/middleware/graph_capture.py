@@ -203,7 +203,12 @@ class _Graph:
 
     def choose(self, wanted: Sequence[str]) -> list[str]:
         """Return the full names of the nodes that are wanted; those of tools only if named."""
-        shown = [full for full, (name, _) in self.names.items() if not _OF_TOOLS.match(name)]
+        shown = [
+            full
+            for full, (name, space) in self.names.items()
+            # A system has a hidden node, and beside it one that answers as a container does.
+            if not _OF_TOOLS.match(name) and join_names(space, f'_{name}') not in self.names
+        ]
         if not wanted:
             if not shown:
                 message = 'there are no nodes on this ROS graph'

@@ -10,7 +10,7 @@ from rclpy.node import Node as RosNode
 from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter import Parameter
 
-from composer.names import join_names
+from composer.names import join_names, split_name
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -36,6 +36,15 @@ _COMMON_SERVICES = (
     '/set_parameters',
     '/set_parameters_atomically',
 )
+_TYPES_OF_EVERY_NODE = {
+    'rcl_interfaces/msg/Log',
+    'rcl_interfaces/msg/ParameterEvent',
+    'type_description_interfaces/srv/GetTypeDescription',
+    *(f'rcl_interfaces/srv/{name}' for name in ('DescribeParameters', 'GetParameterTypes')),
+    *(f'rcl_interfaces/srv/{name}' for name in ('GetParameters', 'ListParameters')),
+    *(f'rcl_interfaces/srv/{name}' for name in ('SetParameters', 'SetParametersAtomically')),
+    *(f'rcl_interfaces/srv/{name}' for name in ('GetLoggerLevels', 'SetLoggerLevels')),
+}
 _INTRODUCTIONS = {
     'topic': 'published topics',
     'service': 'services',
@@ -128,6 +137,20 @@ class RosGraph:
             services = self._node.get_service_names_and_types_by_node(name, namespace)
             return [service for service, _ in services]
         return []
+
+
+def find_ends(ros: RosNode, full_name: str) -> list[tuple[str, str]]:
+    """Return the noun and full name of each end of a node, but of those that all nodes have."""
+    namespace, name = split_name(full_name)
+    ends: list[tuple[str, str]] = []
+    with suppress(NodeNameNonExistentError):
+        for noun, listed in (
+            ('publisher', ros.get_publisher_names_and_types_by_node(name, namespace)),
+            ('subscription', ros.get_subscriber_names_and_types_by_node(name, namespace)),
+            ('service', ros.get_service_names_and_types_by_node(name, namespace)),
+        ):
+            ends += [(noun, end) for end, types in listed if not _TYPES_OF_EVERY_NODE & {*types}]
+    return ends
 
 
 def create_graph_node(context: Context, name: str = _NODE_NAME) -> RosNode:
