@@ -6,7 +6,11 @@ They are those of the package `stand_in`, and of any other there are none:
 - `stand_in::Slow` takes as long as a file `slow` is there.
 - `stand_in::Broken` raises in its constructor; with a file `mended` it does not.
 - `stand_in::Managed` has a lifecycle.
-- `stand_in::Deadly` ends the process while it is loaded, unless there is a file `mended`.
+- `stand_in::Deadly` ends the process while it is loaded, unless there is a file `mended`; with a
+  file `once`, there is one the next time.
+
+As those of Jazzy, they have no services for the levels of their loggers; with a file `levels`, they
+have them, as those of Kilted.
 """
 
 import os
@@ -26,12 +30,18 @@ from component_container import run
 
 class Talker(Node):
     def __init__(self, name, **options):
-        super().__init__(name, automatically_declare_parameters_from_overrides=True, **options)
+        super().__init__(
+            name,
+            automatically_declare_parameters_from_overrides=True,
+            enable_logger_service=Path('levels').exists(),
+            **options,
+        )
         self.publisher = self.create_publisher(String, 'chatter', 10)
         self.timer = self.create_timer(0.05, self.say)
 
     def say(self):
         word = self.get_parameter_or('word', Parameter('word', value='hello')).value
+        self.get_logger().debug('says a word')
         self.publisher.publish(String(data=str(word)))
 
 
@@ -53,6 +63,8 @@ class Broken(Talker):
 class Deadly(Talker):
     def __init__(self, name, **options):
         if not Path('mended').exists():
+            if Path('once').exists():
+                Path('mended').touch()
             os._exit(7)
         super().__init__(name, **options)
 

@@ -128,7 +128,8 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that no two nodes have the same full name."""
     first: dict[str, NodeSpec | ComponentSpec] = {}
     spec = context.spec
-    nodes: list[NodeSpec | ComponentSpec] = [*spec.nodes.values(), *spec.components]
+    nodes: list[NodeSpec | ComponentSpec] = [*spec.nodes.values()]
+    nodes += [component for component in spec.components if component.is_named]
     named = {name: process for process in spec.processes.values() for name in process.named_nodes}
     for node in nodes:
         other = first.setdefault(node.full_name, node)

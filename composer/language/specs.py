@@ -419,6 +419,8 @@ class ComponentSpec:
         types: Those of the parameters that are declared.
         intra_process: Whether messages within the container are handed over.
         lifecycle: The state that it is brought to; `None` to leave it alone.
+        extra_arguments: What else the container is given with the request.
+        is_named: Whether its node has the name of the component, and not one of the plugin's own.
         container: The name of the container.
     """
 
@@ -433,6 +435,8 @@ class ComponentSpec:
     remap: tuple[tuple[str, str], ...]
     log_level: LogLevel | None
     intra_process: bool
+    extra_arguments: Mapping[str, Any]
+    is_named: bool
     wait_for: tuple[ConditionSpec, ...]
     lifecycle: DrivenState | None
     container: str

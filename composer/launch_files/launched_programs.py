@@ -209,15 +209,14 @@ class ProgramReader:
         if 'use_intra_process_comms' in extra:
             data['intra_process'] = extra.pop('use_intra_process_comms')
         if extra:
-            place.remark(f'extra arguments of a component cannot be kept: {", ".join(extra)}')
+            data['extra_arguments'] = extra
         with place.scope.under(held):
             when = place.scope.when
         if when and when != entry.when:
             data['when'] = Computed(f'{{{{ {when} }}}}', True)
         label: str = name.written()
         if not label:
-            label = plugin.text.rpartition(':')[2]
-            place.remark(f"{plugin.text} has no name of its own here: '{label}' is its node")
+            label, data['name'] = plugin.text.rpartition(':')[2], None
         components: dict[str, Any] = entry.data['components']
         if label in components and not when:
             place.remark(f"a second component '{label}' of one container is left out")

@@ -134,7 +134,7 @@ _COMPONENTS = _Rules(
     dict.fromkeys(
         (
             *('namespace', 'package', 'plugin', 'parameters', 'parameter_files', 'remap'),
-            *('log_level', 'intra_process'),
+            *('log_level', 'intra_process', 'extra_arguments', 'is_named'),
         ),
         'a component takes this when it is loaded',
     ),

@@ -85,12 +85,11 @@ class Container(Node):
         extra = {each.name: each.value.bool_value for each in request.extra_arguments}
         self.get_logger().info(f'extra {request.node_name} {sorted(extra)}')
         node: Node = kind(
-            request.node_name,
+            request.node_name or kind.__name__.lower(),
             namespace=request.node_namespace,
             cli_args=arguments,
             use_global_arguments=False,
             parameter_overrides=[Parameter.from_parameter_msg(p) for p in request.parameters],
-            enable_logger_service=extra.get('enable_logger_service', False),
         )
         return node
 

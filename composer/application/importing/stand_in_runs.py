@@ -7,6 +7,7 @@ of the programs that end at once, separated by commas, the file, and its argumen
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import shlex
 import sys
@@ -37,7 +38,8 @@ class StandIns:
     def __init__(self, folder: str, ends: str) -> None:
         self._folder = folder
         self._ends = ends.split(',')
-        self._requests = 0
+        # Actions of launch load from several threads.
+        self._requests = itertools.count(1)
 
     def command(self, command: list[str]) -> list[str]:
         """Return the command line of the stand-in for a program."""
@@ -60,10 +62,10 @@ class StandIns:
             'parameters': {each.name: each.value for each in values},
             'extra': {each.name: each.value for each in extra},
         }
-        self._requests += 1
-        hidden = Path(self._folder) / f'.request_{self._requests}'
+        number = next(self._requests)
+        hidden = Path(self._folder) / f'.request_{number}'
         hidden.write_text(json.dumps(written, default=list), encoding='utf-8')
-        hidden.rename(Path(self._folder) / f'request_{self._requests}.json')
+        hidden.rename(Path(self._folder) / f'request_{number}.json')
 
 
 def run_launch(path: str, arguments: list[str], stand_ins: StandIns) -> int:

@@ -118,6 +118,8 @@ def _parse_component(
         remap=tuple(data.get('remap', {}).items()),
         log_level=data.get('log_level'),
         intra_process=data.get('intra_process', False),
+        extra_arguments=MappingProxyType(data.get('extra_arguments', {})),
+        is_named='name' not in data,
         wait_for=parse_conditions(data, path),
         lifecycle=data.get('lifecycle'),
         container=process,
@@ -134,7 +136,7 @@ def declare_component(component: ComponentSpec, data: dict[str, Any]) -> Declare
     is_declared, sections, parameters = parse_own_ends(data, component.path)
     return DeclaredNodeSpec(
         name=component.name,
-        is_named=True,
+        is_named=component.is_named,
         namespace=component.namespace,
         remap=component.remap,
         sections=sections if is_declared else None,

@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 
 from composer.errors import StartError
 from composer.language.specs import DEFAULT_WAIT_SEC, ConditionSpec
-from composer.names import expand_name, remap_name
+from composer.names import expand_name, remap_name, split_name
 from composer.records import record
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
 from composer.runtime.external.container_client import (
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node as RosNode
 
     from composer.language.specs import ComponentSpec
-    from composer.processes.external_process import ExternalProcess
+    from composer.processes.external_process import ExternalProcess, ProcessRun
     from composer.runtime.nodes.system_handle import SystemHandle
 
 OnLoad: TypeAlias = 'Callable[[ExternalProcess, ComponentSpec, Callable[[], bool]], None]'
@@ -42,6 +42,8 @@ _POLL_SEC = 0.05
 # How often is looked whether a container that runs elsewhere is another one.
 _LOOK_SEC = 1.0
 _LEVEL_SEC = 5.0
+# How long the services of a component that was loaded may take to be seen.
+_SERVICE_SEC = 1.0
 
 
 @record
@@ -71,6 +73,8 @@ class Components:
         self.on_load: OnLoad = lambda _process, _component, _has_ended: None
         self._loaded: dict[tuple[str, str], _Loaded] = {}
         self._clients: dict[str, ContainerClient] = {}
+        # The last run of each container that has all its components again.
+        self._reloaded: dict[str, ProcessRun | None] = {}
         self._node: RosNode | None = None
         self._executor: SystemExecutor | None = None
         self._is_outdated: Callable[[], bool] = never
@@ -122,8 +126,35 @@ class Components:
             is_outdated: Returns whether there is a newer edit, for which it is left.
 
         Raises:
-            StartError: The container cannot load it, or is gone.
+            StartError: The container cannot load it, or is gone for good.
         """
+        run = process.run
+        try:
+            self._try_to_load(process, component, is_outdated)
+        except StartError:
+            # One that is started again gets all its components again.
+            if not self._is_reloaded(process, run, component, is_outdated):
+                raise
+
+    def _is_reloaded(
+        self,
+        process: ExternalProcess,
+        run: ProcessRun | None,
+        component: ComponentSpec,
+        is_outdated: Callable[[], bool],
+    ) -> bool:
+        """Wait for the next run of a container that has ended; return whether that has it."""
+        if process.spec.external or (process.run is run and process.has_come_to('running')):
+            return False
+        while process.run is run or self._reloaded.get(process.spec.name) is not process.run:
+            is_over = process.is_done or process.is_leaving or is_outdated()
+            if is_over or self._system.stop.is_set or self._stopping.wait(_POLL_SEC):
+                return False
+        return (process.spec.name, component.key) in self._loaded
+
+    def _try_to_load(
+        self, process: ExternalProcess, component: ComponentSpec, is_outdated: Callable[[], bool]
+    ) -> None:
         with self._lock:
             self._is_outdated = is_outdated
             try:
@@ -181,6 +212,13 @@ class Components:
 
     def reload(self, process: ExternalProcess) -> None:
         """Load all components into a container that has begun anew."""
+        run = process.run
+        try:
+            self._reload(process)
+        finally:
+            self._reloaded[process.spec.name] = run
+
+    def _reload(self, process: ExternalProcess) -> None:
         name, components = process.spec.name, process.spec.components
         if not components:
             return
@@ -189,13 +227,14 @@ class Components:
             for at in [each for each in self._loaded if each[0] == name]:
                 before |= self._loaded.pop(at).servers
             client = self._client(process)
+            client.forget()
             while not client.servers - before:
                 if self._find_end(process) or self._stopping.wait(_POLL_SEC):
                     return
             count = 0
             for component in components.values():
                 try:
-                    self.load(process, component)
+                    self._try_to_load(process, component, never)
                 except StartError as error:
                     system_logger.error(str(error))
                     if self._find_end(process):
@@ -211,6 +250,8 @@ class Components:
         with self._lock:
             for process in {each.process for each in self._loaded.values()}:
                 self.release(process, _STOP_SEC)
+            for client in self._clients.values():
+                client.settle(_STOP_SEC)
         if self._watcher is not None:
             self._watcher.join()
         if self._executor is not None:
@@ -220,17 +261,21 @@ class Components:
 
     def _load(self, process: ExternalProcess, component: ComponentSpec) -> None:
         client = self._client(process)
+        client.settle()
         name = component.full_name
         timeout_sec = DEFAULT_WAIT_SEC if process.spec.external else None
-        if name in client.list_nodes(timeout_sec).values():
+        if component.is_named and name in client.list_nodes(timeout_sec).values():
             message = f"it has a node '{name}' already, which somebody else has loaded"
             raise ContainerError(message)
-        unique_id, _ = client.load(self.request_for(component), f"'{component.key}'")
+        unique_id, full_name = client.load(self.request_for(component), f"'{component.key}'")
+        if not component.is_named:
+            namespace, name = split_name(full_name)
+            component = replace(component, namespace=namespace, name=name)
         self._loaded[process.spec.name, component.key] = _Loaded(
             component, process, unique_id, client.servers
         )
-        if component.log_level is not None:
-            self._set_level(component)
+        if component.log_level is not None and client.has_logger_services is not False:
+            self._set_level(component, client)
         self._tell_load(self._loaded[process.spec.name, component.key])
         if process.spec.external and self._watcher is None:
             self._watcher = threading.Thread(
@@ -295,8 +340,11 @@ class Components:
         is_ours = not process.spec.external
         return process.state if is_ours and not process.has_come_to('running') else ''
 
-    def _set_level(self, component: ComponentSpec) -> None:
-        """Give the logger of a component its level, which a container cannot."""
+    def _set_level(self, component: ComponentSpec, container: ContainerClient) -> None:
+        """Give the logger of a component its level, if it has a service for that.
+
+        Whether it has one is the container's matter: rclcpp_components has it since Kilted.
+        """
         from rcl_interfaces.msg import LoggerLevel
         from rcl_interfaces.srv import SetLoggerLevels
 
@@ -305,6 +353,15 @@ class Components:
         name = f'{component.full_name}/set_logger_levels'
         client = self._node.create_client(SetLoggerLevels, name)
         try:
+            if container.has_logger_services is None:
+                container.has_logger_services = client.wait_for_service(_SERVICE_SEC)
+            if not container.has_logger_services:
+                system_logger.warning(
+                    f"container '{container.full_name}' has no services for log levels, so that "
+                    'log_level of its components counts for nothing: give the levels in its '
+                    'arguments, as in [--ros-args, --log-level, NODE:=debug]'
+                )
+                return
             logger = component.full_name.strip('/').replace('/', '.')
             level = LoggingSeverity[component.log_level.upper()].value
             levels = [LoggerLevel(name=logger, level=level)]
@@ -350,17 +407,23 @@ def _write_request(component: ComponentSpec, entries: Mapping[str, Any]) -> Any:
         if entry.type is not None
     ]
     level = component.log_level
-    extra = [Parameter('use_intra_process_comms', value=True)] * component.intra_process
-    extra += [Parameter('enable_logger_service', value=True)] * (level is not None)
+    asked = {
+        'use_intra_process_comms': component.intra_process,
+        'enable_logger_service': level is not None,
+    }
+    extra = {name: True for name, is_asked in asked.items() if is_asked}
+    extra |= component.extra_arguments
     return LoadNode.Request(
         package_name=component.package,
         plugin_name=component.plugin,
-        node_name=component.name,
+        node_name=component.name if component.is_named else '',
         node_namespace=component.namespace,
         log_level=LoggingSeverity[level.upper()].value if level else 0,
         remap_rules=[f'{old}:={new}' for old, new in component.remap],
         parameters=[each.to_parameter_msg() for each in parameters],
-        extra_arguments=[each.to_parameter_msg() for each in extra],
+        extra_arguments=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in extra.items()
+        ],
     )
 
 

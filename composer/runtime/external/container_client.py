@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from time import monotonic
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from rclpy.client import Client
     from rclpy.node import Node as RosNode
+    from rclpy.task import Future
 
 # The first two services of a container, as rclcpp_components names them.
 LOAD_SERVICE = '_container/load_node'
@@ -41,6 +42,10 @@ class ContainerClient:
         self.full_name = full_name
         self._node = node
         self._gives_up = gives_up
+        # Requests to load that were given up: nobody can stop the container from obeying them.
+        self._given_up: list[Future] = []
+        # Whether its components have services for the levels of their loggers; `None` if unknown.
+        self.has_logger_services: bool | None = None
         # In this order: a container that answers the last question knows the clients before it.
         self._load = node.create_client(LoadNode, f'{full_name}/{LOAD_SERVICE}')
         self._unload = node.create_client(UnloadNode, f'{full_name}/_container/unload_node')
@@ -80,13 +85,51 @@ class ContainerClient:
             what: The component in words.
 
         Raises:
-            ContainerError: The container could not load it, or is gone.
+            ContainerError: The container could not load it, is gone, or there is a newer edit.
+                What it loads all the same is unloaded when it answers.
         """
+        self.settle()
         notice = WaitNotice(system_logger.info, f"the container '{self.full_name}' to load {what}")
         answer = self._ask(self._load, request, None, notice)
         if not answer.success:
             raise ContainerError(answer.error_message or 'it gave no reason')
         return answer.unique_id, answer.full_node_name
+
+    def settle(self, timeout_sec: float | None = None) -> None:
+        """Wait until what was loaded by requests that were given up is unloaded.
+
+        Raises:
+            ContainerError: The container is gone, or there is a newer edit.
+        """
+        begun = monotonic()
+        what = f"the container '{self.full_name}' to answer a request that is not wanted any more"
+        notice = WaitNotice(system_logger.info, what)
+        while self._given_up and (timeout_sec is None or monotonic() < begun + timeout_sec):
+            if reason := self._gives_up():
+                raise ContainerError(reason)
+            notice.log_if_due(begun)
+            sleep(_POLL_SEC)
+
+    def forget(self) -> None:
+        """Forget what was asked of a container that has ended."""
+        self._given_up.clear()
+
+    def _give_up(self, loading: Future) -> None:
+        self._given_up.append(loading)
+
+        def is_over(_future: Future) -> None:
+            if loading in self._given_up:
+                self._given_up.remove(loading)
+
+        def unload(_future: Future) -> None:
+            answer = loading.result()
+            if answer is None or not answer.success:
+                is_over(loading)
+                return
+            request = self._unload.srv_type.Request(unique_id=answer.unique_id)
+            self._unload.call_async(request).add_done_callback(is_over)
+
+        loading.add_done_callback(unload)
 
     def unload(self, unique_id: int, timeout_sec: float) -> None:
         """Unload a component.
@@ -120,7 +163,10 @@ class ContainerClient:
                 client.remove_pending_request(future)
                 return None
             if reason := self._gives_up():
-                client.remove_pending_request(future)
+                if client is self._load:
+                    self._give_up(future)
+                else:
+                    client.remove_pending_request(future)
                 raise ContainerError(reason)
             if notice is not None:
                 notice.log_if_due(begun)

@@ -178,6 +178,73 @@ def test_a_stop_does_not_wait_for_a_slow_component(compose):
     assert child.stop() == 130
 
 
+def test_a_container_that_ends_while_it_loads_gets_all_again(compose, listed):
+    (compose.folder / 'once').touch()
+    components = {'talker': component(), 'it': component('Deadly')}
+    child = compose(system({'perception': container(components, restart={'delay': 0})}))
+
+    child.wait_for_line('2 components and 1 process ready in ')
+    assert listed('/perception') == {1: '/talker', 2: '/it'}
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize('has_services', [True, False])
+def test_levels_are_set_where_the_container_has_services_for_them(compose, has_services):
+    if has_services:
+        (compose.folder / 'levels').touch()
+    components = {name: component(log_level='debug') for name in 'ab'}
+    child = compose(system({'perception': container(components)}))
+    child.wait_for_line('2 components and 1 process ready in ')
+    if has_services:
+        child.wait_for_line('[b]: says a word')
+    assert len(child.matching('has no services for log levels')) == (not has_services)
+    assert child.stop() == 0
+
+
+def test_a_component_may_keep_the_name_of_its_plugin(compose, listed):
+    extra = {'forward_global_arguments': False}
+    components = {'it': component(name=None, namespace='left', extra_arguments=extra)}
+    child = compose(system({'perception': container(components)}, diagnostics={}))
+    child.wait_until_ready()
+
+    assert listed('/perception') == {1: '/left/talker'}
+    command = [sys.executable, '-m', 'composer', 'top', '--once', '--format', 'json']
+    shown = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    rows = [(each['node'], each['kind'], each['name']) for each in shown['entities']]
+    assert ('/left/talker', 'publisher', '/left/chatter') in rows
+    assert not [name for _, _, name in rows if name.endswith(('/rosout', '_parameters'))]
+    child.wait_for_line("extra  ['forward_global_arguments']")
+    restarted = subprocess.run(
+        [sys.executable, '-m', 'composer', 'restart', '/left/talker'], check=False
+    )
+    assert restarted.returncode == 0
+    assert listed('/perception') == {2: '/left/talker'}
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize('stays', [True, False])
+def test_an_edit_waits_for_what_the_one_before_has_loaded(compose, listed, wait_for, stays):
+    def edit(**components):
+        beside = compose.folder / 'system.new'
+        beside.write_text(system({'perception': container({'a': component(), **components})}))
+        beside.replace(compose.folder / 'system.yaml')
+
+    edit()
+    child = compose.run('system.yaml', '--watch')
+    child.wait_until_ready()
+    (compose.folder / 'slow').touch()
+    edit(slow=component('Slow'))
+    child.wait_for_line("Waiting for the container '/perception' to load 'slow'…")
+    edit(b=component(), **({'slow': component('Slow')} if stays else {}))
+    child.wait_for_line('to answer a request that is not wanted any more…')
+    (compose.folder / 'slow').unlink()
+    child.wait_for_line('reloaded in ')
+    names = ['/a', '/b', *['/slow'] * stays]
+    wait_for(lambda: sorted(listed('/perception').values()) == names, 'these components')
+    assert not child.matching('not reloaded')
+    assert child.stop() == 0
+
+
 def test_what_fails_after_a_restart_is_told_and_the_rest_runs_on(compose):
     (compose.folder / 'mended').touch()
     components = {'it': component('Broken'), 'talker': component()}
