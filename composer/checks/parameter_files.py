@@ -24,6 +24,7 @@ from composer.records import record
 from composer.ros_parameters.file_reader import parse_parameter_file
 from composer.ros_parameters.file_writer import render_parameters_for_all
 from composer.ros_parameters.node_patterns import PatternIndex, covers_pattern, matches_pattern
+from composer.ros_parameters.parameter_types import suggest_value
 from composer.spelling import count_edits, did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -484,17 +485,7 @@ def _find_problem(
     if entry.type != wanted:
         got = with_article(entry.type) if entry.type else 'an empty list'
         problem = f'expected {with_article(wanted)}, and ROS takes this for {got}'
-        return problem, _help_for(wanted, entry)
+        return problem, suggest_value(wanted, entry.value, entry.value_span.text)
     if declared is None:
         return None, None
     return find_refusal(declared, entry.value), find_nearest_choice(declared, entry.value)
-
-
-def _help_for(wanted: str, entry: ParameterEntry) -> str | None:
-    if (wanted, entry.type) == ('double', 'integer'):
-        return f'write {float(entry.value)}'
-    if wanted == 'double_array' and entry.type == 'integer_array':
-        return f'write {[float(item) for item in entry.value]}'
-    if wanted == 'string' and entry.type in ('integer', 'double', 'bool'):
-        return f"put it in quotes: '{entry.value_span.text}'"
-    return None

@@ -21,6 +21,7 @@ from composer.ros_parameters.parameter_types import (
     convert_parameter_value,
     find_type_problem,
     infer_parameter_type,
+    suggest_value,
 )
 from composer.spelling import suggest
 
@@ -142,8 +143,7 @@ def _find_refusals(
         if inferred != parameter.type:
             got, wanted = with_article(inferred), with_article(parameter.type)
             problem: str | None = f'expected {wanted}, and ROS takes this for {got}'
-            is_whole = (parameter.type, inferred) == ('double', 'integer')
-            help_text = f'write {float(value)}' if is_whole else help_text
+            help_text = suggest_value(parameter.type, value) or help_text
         else:
             problem = find_refusal(parameter, value)
         if problem:

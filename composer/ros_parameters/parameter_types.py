@@ -51,6 +51,22 @@ def convert_parameter_value(value: Any, type_name: str | None) -> Any:
     return value
 
 
+def suggest_value(wanted: str | None, value: Any, text: str = '') -> str | None:
+    """Return the help for a value that ROS reads as another type than is wanted.
+
+    Args:
+        text: The value as it is written.
+    """
+    got = infer_parameter_type(value)
+    if (wanted, got) == ('double', 'integer'):
+        return f'write {float(value)}'
+    if (wanted, got) == ('double_array', 'integer_array'):
+        return f'write {[float(item) for item in value]}'
+    if wanted == 'string' and got in ('integer', 'double', 'bool'):
+        return f"put it in quotes: '{text or value}'"
+    return None
+
+
 def find_type_problem(value: Any, type_name: str) -> str | None:
     """Return why a value is not of a parameter type, or `None` if it is."""
     return next((problem for _, problem in find_type_problems(value, type_name)), None)

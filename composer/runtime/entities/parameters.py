@@ -17,7 +17,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 
 from composer.errors import StartError
-from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN
+from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN, suggest_value
 from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner
 
@@ -74,7 +74,8 @@ class NodeParameters:
         except ParameterException as error:
             reason = str(error).removesuffix(f': {spec.name}')
             message = f"parameter '{spec.name}' from {_origin(ros, spec.name)}: {reason}"
-            raise StartError(message) from error
+            advice = suggest_value(spec.type, ros.find_override(spec.name))
+            raise StartError(message, help=advice) from error
 
     def undeclare(self, name: str) -> None:
         """Remove a parameter, read-only ones included."""
@@ -143,20 +144,11 @@ class NodeParameters:
             return [
                 given[name]
                 if name in given and given[name].value is value
-                else self._parameter(name, value)
+                else node.ros.as_declared(Parameter(name, value=value))
                 for name, value in wanted.items()
             ]
 
         return change
-
-    def _parameter(self, name: str, value: Any) -> Parameter:
-        """Return a parameter with a value of Python; an integer may be that of a double."""
-        spec = self.specs.get(name)
-        if spec is None or value is None:
-            return Parameter(name, value=value)
-        if spec.type == 'double' and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        return Parameter(name, value=value)
 
     @contextmanager
     def _as_own(self) -> Iterator[None]:

@@ -50,7 +50,7 @@ from composer.runtime.nodes.node_logger import NodeLogger
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent
+    from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, SetParametersResult
     from rclpy.context import Context
     from rclpy.publisher import Publisher
 
@@ -170,6 +170,38 @@ class ComposedRosNode(Node):
         """Return the value that a file or the command line gives a parameter; `None` for none."""
         entry, override = self.from_files.get(name), self._parameter_overrides.get(name)
         return entry.value if entry else override and override.value
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """See the base class; values have the types that are declared, see `as_declared`."""
+        results: list[SetParametersResult] = super().set_parameters(
+            [self.as_declared(each) for each in parameter_list]
+        )
+        return results
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """See the base class; values have the types that are declared, see `as_declared`."""
+        return super().set_parameters_atomically(
+            [self.as_declared(each) for each in parameter_list]
+        )
+
+    def as_declared(self, parameter: Parameter) -> Parameter:
+        """Return a parameter with the type that is declared, where its value allows that.
+
+        An empty list has any type of lists, and an integer is a double.
+        """
+        if not self.has_parameter(parameter.name):
+            return parameter
+        kind = Parameter.Type(self.describe_parameter(parameter.name).type)
+        value, is_array = parameter.value, parameter.type_.name.endswith('_ARRAY')
+        if kind in (Parameter.Type.NOT_SET, parameter.type_):
+            return parameter
+        if is_array and kind.name.endswith('_ARRAY') and not len(value):
+            return Parameter(parameter.name, kind, [])
+        given = {'INTEGER': 'DOUBLE', 'INTEGER_ARRAY': 'DOUBLE_ARRAY'}.get(parameter.type_.name)
+        if given != kind.name:
+            return parameter
+        doubles = [float(item) for item in value] if is_array else float(value)
+        return Parameter(parameter.name, kind, doubles)
 
     def start_parameter_services(self) -> None:
         """Create the parameter services, unless the node has them or the file turns them off."""

@@ -63,11 +63,11 @@ def asking(behaviour, arguments, *, server=SERVER, namespace='/robot'):
     ('of', 'namespace'), [('server', '/robot'), ('/robot/server', '/other'), ('robot/server', '/')]
 )
 def test_parameters_of_a_node_of_this_process_are_set_and_read(compose, of, namespace):
-    arguments = f'{{of: {of}, values: {{speed: 1.5, mode: fast, names: [three]}}}}'
+    arguments = f'{{of: {of}, values: {{speed: 1, mode: fast, names: []}}}}'
     child = compose(asking('change', arguments, namespace=namespace), CODE)
 
     assert child.wait_for_line('now: ').endswith(
-        "now: {'speed': 1.5, 'mode': 'fast', 'names': ['three']}"
+        "now: {'speed': 1.0, 'mode': 'fast', 'names': []}"
     )
     assert child.stop() == 0
 
