@@ -22,6 +22,7 @@ from composer.network.local_networks import wait_for_network, wait_for_port
 from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot_taking import take_snapshot
+from composer.processes.kernel import check_kernel
 from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
@@ -81,7 +82,8 @@ def up(  # noqa: PLR0913 - one for each option
 
     Raises:
         RosNotFoundError: There is no rclpy.
-        StartError: The system could not start, or a port that it needs is in use.
+        StartError: The system could not start, a port that it needs is in use, or the kernel
+            lacks something.
         UsageError: The arguments do not fit the file, or the ROS arguments are wrong; or standard
             input is to be watched.
     """
@@ -94,6 +96,7 @@ def up(  # noqa: PLR0913 - one for each option
         message = '--watch cannot watch standard input, which is read once'
         raise UsageError(message, help='give a file')
     if ends_process:
+        check_kernel()
         note_start()
     reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
     begun_ns = time_ns()

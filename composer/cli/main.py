@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import faulthandler
 import gc
 import io
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 _LONGEST_EXIT_SEC = 10.0
+_MACHINE_ERRORS = {
+    *(errno.ENOENT, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC),
+    errno.ENOSYS,
+}
 
 
 def main() -> None:
@@ -87,11 +92,12 @@ def run(arguments: list[str]) -> int:
         # Of click: the reader of our output has gone, as `head` does.
         return ExitCode.FAILED
     except Exception as error:  # noqa: BLE001 - all that is left is a bug in Composer
-        if _is_of_output(error):
-            _print_error(f'cannot write the output: {error.strerror}', None)
-            return ExitCode.FAILED
-        _print(_bug_report(arguments))
-        return ExitCode.BUG
+        known = _explain_machine(error)
+        if known is None:
+            _print(_bug_report(arguments))
+            return ExitCode.BUG
+        _print_error(*known)
+        return ExitCode.FAILED
 
 
 def split_ros_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -160,6 +166,32 @@ def _is_of_output(error: Exception) -> TypeGuard[OSError]:
 
     frames = list(traceback.walk_tb(error.__traceback__))
     return isinstance(error, OSError) and frames[-1][0].f_code is click.echo.__code__
+
+
+def _explain_machine(error: Exception) -> tuple[str, str | None] | None:
+    """Return message and help of an error of the machine, not of Composer; else `None`."""
+    import tempfile
+
+    from composer.processes.kernel import THREADS_HELP
+
+    if _is_of_output(error):
+        return f'cannot write the output: {error.strerror}', None
+    if isinstance(error, MemoryError):
+        return 'out of memory', None
+    if str(error) == "can't start new thread":
+        return str(error), THREADS_HELP
+    if isinstance(error, ImportError) and 'failed to map segment' in str(error):
+        return str(error), None
+    if not isinstance(error, OSError) or error.errno not in _MACHINE_ERRORS:
+        return None
+    if error.errno != errno.ENOENT:
+        return str(error), None
+    try:
+        tempfile.gettempdir()
+    except FileNotFoundError:
+        message = 'no folder for temporary files can be written to'
+        return message, 'set TMPDIR, or mount a tmpfs at /tmp'
+    return None
 
 
 def _translate(error: click.ClickException) -> tuple[str, str]:

@@ -146,7 +146,8 @@ class TimerFd:
         flags = os.O_CLOEXEC if self._blocking else os.O_CLOEXEC | os.O_NONBLOCK
         fd: int = _libc.timerfd_create(_CLOCK_MONOTONIC, flags)
         if fd < 0:
-            raise OSError(ctypes.get_errno(), 'timerfd_create failed')
+            message = f'timerfd_create: {os.strerror(ctypes.get_errno())}'
+            raise ExecutorError(message)
         return fd
 
     def expire_at(self, deadline_ns: int) -> None:

@@ -136,9 +136,14 @@ class Channel:
                     if answer := self._answers.get(number):
                         answer.put((name, value))
                     continue
-                threading.Thread(
+                thread = threading.Thread(
                     target=self._serve, args=(number, name, value), name=name, daemon=True
-                ).start()
+                )
+                try:
+                    thread.start()
+                except RuntimeError as error:
+                    # There may be no more threads: whoever asks must not wait for ever.
+                    self._answer(number, _ERROR, ComposerError(f'{name}: {error}'))
         self._is_lost = True
         for answer in list(self._answers.values()):
             answer.put((_LOST, None))
@@ -154,6 +159,9 @@ class Channel:
             kind, value = _ERROR, _portable(error)
         except BaseException as error:  # noqa: BLE001 - the other end waits for an answer
             kind, value = _ERROR, ComposerError(f'{name}: {error!r}')
+        self._answer(number, kind, value)
+
+    def _answer(self, number: int, kind: str, value: Any) -> None:
         if number:
             self._send((number, kind, value))
 

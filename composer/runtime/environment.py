@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.environment import find_environment_problems
 from composer.errors import RosNotFoundError, StartError
+from composer.processes.kernel import check_kernel
 from composer.terminal import colour_of
 
 if TYPE_CHECKING:
@@ -30,14 +31,16 @@ _NO_ROS_HELP = (
 
 
 def check_ros() -> None:
-    """Check that ROS 2 is there, without importing it.
+    """Check that ROS 2 is there, without importing it, and what it needs of the kernel.
 
     Raises:
         RosNotFoundError: There is no rclpy.
+        StartError: The kernel lacks something.
     """
     if importlib.util.find_spec('rclpy') is None:
         message = 'cannot run without ROS 2: this Python has no rclpy'
         raise RosNotFoundError(message, help=_NO_ROS_HELP)
+    check_kernel()
 
 
 @contextmanager

@@ -1,6 +1,8 @@
 """Machines, and those who start Composer, that lack or forbid what others allow."""
 
 import os
+import re
+import resource
 import signal
 import subprocess
 import sys
@@ -61,3 +63,61 @@ def test_a_launcher_that_ignores_its_children_changes_nothing(run):
     code, output = run('up process.yaml', preexec_fn=ignore)
     assert code == 1, output
     assert "process 'sleeper' has ended with exit code 7, so the system ends" in output
+
+
+REFUSED = 'def refuse(*_):\n    raise OSError(38, "Function not implemented")\n'
+LACKS = {
+    'pidfd_open': 'import os; os.pidfd_open = refuse',
+    'pidfd_send_signal': 'import signal; signal.pidfd_send_signal = refuse',
+    'eventfd': 'import os; os.eventfd = refuse',
+    'epoll': 'import select; select.epoll = refuse',
+    'prlimit': 'import resource; resource.setrlimit = resource.getrlimit = refuse',
+}
+
+
+@pytest.mark.parametrize('call', LACKS)
+def test_a_kernel_that_lacks_a_call_is_refused_in_one_line(run, call):
+    for command in ('up system.yaml', 'up worker.yaml', 'test some.scenario.yaml', 'down'):
+        code, output = run(command, REFUSED + LACKS[call])
+        assert code == 1
+        message, advice = output.splitlines()
+        assert message.startswith('error: systems cannot run here without ')
+        assert call in message
+        assert message.endswith(': Function not implemented')
+        assert 'Linux 5.3' in advice
+
+
+def test_a_python_that_lacks_a_call_is_refused_in_one_line(run):
+    code, output = run('up system.yaml', 'import os; del os.pidfd_open')
+    assert (code, output.count('error: ')) == (1, 1)
+    assert output.splitlines()[0].endswith(': this Python lacks it')
+
+
+@pytest.mark.parametrize(
+    'command', ['up system.yaml', 'up worker.yaml', 'test some.scenario.yaml']
+)
+def test_too_few_threads_are_refused_before_the_start(run, command):
+    """Each stack takes a gigabyte, of eight that the process may have."""
+    before = 'import threading\nthreading.stack_size(1 << 30)'
+    limits = (8 << 30, 8 << 30)
+    code, output = run(
+        command, before, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limits)
+    )
+    message, advice = output.splitlines()
+    assert code == 1
+    assert re.fullmatch(
+        r'error: the system needs \d+ more threads, and only \d can be started', message
+    )
+    assert '--pids-limit' in advice
+
+
+@pytest.mark.parametrize(
+    'command', ['up worker.yaml', 'up process.yaml', 'test some.scenario.yaml']
+)
+def test_a_machine_without_temporary_folder_is_told_in_one_line(run, command):
+    """As in a container whose root is read-only."""
+    before = 'import tempfile\ntempfile._candidate_tempdir_list = lambda: ["/proc/none"]'
+    code, output = run(command, before)
+    errors = [line for line in output.splitlines() if 'error: ' in line]
+    assert (code, len(errors)) == (1, 1), output
+    assert re.search('No usable temporary directory|no folder for temporary files', errors[0])

@@ -18,6 +18,12 @@ from typing import TYPE_CHECKING, Any, Self
 from composer.errors import ComposerError, ExitCode
 from composer.language.bindings import system_bindings
 from composer.network.transport_profile import shared_memory_variables
+from composer.processes.kernel import (
+    KEEPER_THREADS,
+    SYSTEM_THREADS,
+    WORKER_THREADS,
+    check_threads,
+)
 from composer.runtime.rewiring.order_of_ends import order_ends
 from composer.runtime.workers.assignment import Assignment, ImportRequest
 from composer.runtime.workers.at_once import ANSWER_SEC, ask_all, do_at_once
@@ -136,15 +142,22 @@ class Workers:
         Raises:
             StartError: A process cannot be started.
         """
-        for name in used_workers(spec) if self.are_used else ():
-            worker = spec.workers[name]
-            before = self._coming.get(name) or self._workers.get(name)
-            if before is None or needs_new_process(before.spec, worker):
-                functions = self._calls.functions_for(name)
-                self._coming[name] = new = Worker(
-                    worker, self._supervisor, functions, self._calls.list_clients
-                )
-                new.spawn()
+        both = {**self._workers, **self._coming}
+        wanted = [spec.workers[name] for name in used_workers(spec)] if self.are_used else []
+        wanted = [
+            each
+            for each in wanted
+            if each.name not in both or needs_new_process(both[each.name].spec, each)
+        ]
+        own = 0 if self._is_bound else SYSTEM_THREADS
+        keepers = KEEPER_THREADS if wanted else 0
+        check_threads(own + keepers + WORKER_THREADS * len(wanted))
+        for each in wanted:
+            functions = self._calls.functions_for(each.name)
+            worker = Worker(each, self._supervisor, functions, self._calls.list_clients)
+            worker.spawn()
+            # Only now: the early start tells no error, and the next one tries again.
+            self._coming[each.name] = worker
 
     def import_behaviours(
         self, snapshot: Snapshot, search_path: Iterable[Path], stale: Collection[str] = ()

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from composer.errors import ComposerError
+from composer.processes.kernel import CASE_THREADS, check_threads
 from composer.scenarios.running.fixed_environment import fix_environment
 
 if TYPE_CHECKING:
@@ -64,9 +65,14 @@ class CaseClient:
         self.close()
 
     def start(self) -> None:
-        """Start the server, and do not wait for it."""
+        """Start the server, and do not wait for it.
+
+        Raises:
+            StartError: There may not be as many threads as a case needs.
+        """
         if self._process is not None:
             return
+        check_threads(CASE_THREADS)
         own, its = Pipe()
         self._folder = tempfile.mkdtemp(prefix='composer-cases-')
         command = [sys.executable, '-P', '-c', _PROGRAM]
