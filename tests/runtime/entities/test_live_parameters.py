@@ -361,7 +361,7 @@ nodes:
     parameters: {name: Alice, rate: 1.0, count: {default: 1, maximum: 5}, mode: {default: a, choices: [a, b]}}
     timers: {tell: {period: 0.05, behaviour: 'parts:tell'}}
   second:
-    parameters: {name: Alice, count: 1, mode: a}
+    parameters: {rate: 1.0, name: Alice, count: 1, mode: a}
     timers: {tell: {period: 0.05, behaviour: 'parts:tell'}}
 """
 
