@@ -28,13 +28,17 @@ PIP_FLAGS := --upgrade --upgrade-strategy eager
 endif
 BIN := $(VENV)/bin
 
-.PHONY: up test check format docs bench lock clean newest
+.PHONY: up test test-all check format docs bench lock clean newest
 
 up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal $(ARGS)
+
+# Also those that take longer than a minute; and C++ programs, where the environment has them.
+test-all: export LONG := 1
+test-all: test
 
 check: $(VENV)/ready
 	$(BIN)/ruff check .
