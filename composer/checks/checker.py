@@ -40,7 +40,7 @@ from composer.checks.placement.network_paths import check_network
 from composer.checks.placement.processes_elsewhere import check_processes_elsewhere
 from composer.checks.placement.shared_objects import check_shared_objects
 from composer.checks.process_parameters import check_process_parameters
-from composer.checks.processes import check_executables, check_processes
+from composer.checks.processes import check_executables, check_processes, check_unevaluated
 from composer.checks.references import (
     check_content_filters,
     check_publish,
@@ -91,6 +91,7 @@ SYSTEM_RULES: tuple[CheckRule, ...] = (
     check_full_names,
     check_parameter_files,
     check_executables,
+    check_unevaluated,
     check_launch_files,
     check_start_values,
     check_left_out,

@@ -1,4 +1,4 @@
-"""External processes."""
+"""External processes, and texts that launch files and shells evaluate, and nobody here."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from composer.ament import (
     list_packages,
 )
 from composer.checks.names import IS_EMPTY, check_rules
+from composer.diagnostics import diagnostic_at
 from composer.input_limits import explain_missing
 from composer.language.paths import PathError, explain_absent, is_in_package, resolve_path
 from composer.names import find_namespace_problem, find_node_name_problem
@@ -25,18 +26,28 @@ from composer.programs import (
     is_on_path,
     shell_environment,
 )
+from composer.ros_parameters.expressions_in_files import find_substitution
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import ProcessSpec
+    from composer.yaml_text.positions import DataPath
 
 # What takes a script as its first argument after flags without values.
 _INTERPRETERS = re.compile(r'(?:python|pypy)[\d.]*|(?:ba|da|z)?sh|perl|ruby')
 _FLAGS = re.compile('-[bBdEeiIOPqsSuvx]+')
+# What evaluates its arguments as a shell, or takes operators as arguments.
+_EVALUATE = re.compile(
+    r'-\w*c|(.*/)?((ba|da|k|z)?sh|ssh|su|watch|tmux|screen|xterm|expr|test|\[|dpkg|find)'
+)
+_VARIABLE = re.compile(r'(?:^|(?<=[=:,/_-]))(\$(?:[A-Z_][A-Z0-9_]*|\{[A-Z_][A-Z0-9_]*\}))(?!\w)')
+_HOME = re.compile(r'(?:^|(?<==))~(?=/)')
+_OPERATOR = re.compile(r'&&|\|\|?|[12&]?>>?(/\S*|&[12])?')
+_SIGNS = re.compile(r'\$|~/|[|>&]')
 # Commands of ROS 2 and its tools, which nobody misses where there is no ROS 2.
 _OF_ROS = ('ros2', 'rviz', 'rqt', 'gz', 'plotjuggler', 'foxglove')
 
@@ -58,6 +69,59 @@ def check_executables(context: CheckContext) -> Iterator[Diagnostic]:
         yield from _check_folder(context, process)
         yield from _check_program(context, process)
         yield from _check_script(context, process)
+
+
+def check_unevaluated(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check that no text has to be evaluated by a launch file or a shell."""
+    values = context.system.positions.values
+    sources = {span.source for span in values.values()}
+    lines = {
+        (source, number)
+        for source in sources
+        for number, line in enumerate(source.lines, 1)
+        if _SIGNS.search(line)
+    }
+    for path, span in values.items():
+        if (span.source, span.line) not in lines or path[-1:] == ('description',):
+            continue
+        text = span.text.strip('\'"')
+        # Arguments by name are those of launch files, whose programs may know `~`.
+        is_list = path[-2:-1] in (('command',), ('arguments',)) and isinstance(path[-1], int)
+        is_command = is_list and 'parameters' not in path
+        before = [values[at].text.strip('\'"') for at in _items_before(path) if at in values]
+        if is_command and any(map(_EVALUATE.fullmatch, before)):
+            continue
+        who, found = 'nobody', find_substitution(text)
+        if found is None and is_command:
+            who, found = 'no shell', _find_for_shells(text, before)
+        elif found is None and path[-2:-1] in (('env',), ('environment',)):
+            who, found = 'no shell', None if 'parameters' in path else _find_variable(text)
+        if found:
+            message = f"{who} evaluates '{found[0]}' here: it stays text"
+            place = span.narrowed_to(found[0], first=True)
+            yield diagnostic_at(place, 'unevaluated-expression', message, help=f'write {found[1]}')
+
+
+def _items_before(path: DataPath) -> Iterator[DataPath]:
+    """Yield the paths of the items before that of a list."""
+    for index in range(path[-1] if path and isinstance(path[-1], int) else 0):
+        yield (*path[:-1], index)
+
+
+def _find_variable(text: str) -> tuple[str, str] | None:
+    """Return a variable as shells have them, and the expression for it."""
+    found = None if '{{' in text else _VARIABLE.search(text)
+    return (found[1], f"{{{{ env('{found[1].strip('${}')}') }}}}") if found else None
+
+
+def _find_for_shells(text: str, before: Sequence[str]) -> tuple[str, str] | None:
+    """Return what a shell evaluates in an argument, and what to write for it."""
+    if before and _OPERATOR.fullmatch(text):
+        return text, "command: [sh, -c, '…'], with the whole command line"
+    is_name = '--ros-args' in before or ':=' in text
+    if '{{' not in text and not is_name and _HOME.search(text):
+        return '~', "{{ env('HOME') }}"
+    return _find_variable(text)
 
 
 def _check_process_names(context: CheckContext, process: ProcessSpec) -> Iterator[Diagnostic]:

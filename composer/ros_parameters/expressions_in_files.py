@@ -127,8 +127,8 @@ class _Treating:
         return MappingNode(node.tag, node.span, pairs)
 
     def _treat_scalar(self, node: ScalarNode) -> TreeNode:
-        if '$(' in node.text and (found := _SUBSTITUTION.search(node.text)):
-            self._report(node, found.group(), _in_our_words(found))
+        if found := find_substitution(node.text):
+            self._report(node, *found)
         if _OPEN not in node.text:
             return node
         if self._evaluator is None:
@@ -150,6 +150,12 @@ class _Treating:
         message = f"ROS does not evaluate '{text}': it would be the value as it stands here"
         span = node.span.narrowed_to(text, first=True)
         self.findings.append(diagnostic_at(span, _RULE, message, help=advice))
+
+
+def find_substitution(text: str) -> tuple[str, str] | None:
+    """Return the first substitution of launch files in a text, and the expression for it."""
+    found = _SUBSTITUTION.search(text) if '$(' in text else None
+    return (found.group(), _in_our_words(found)) if found else None
 
 
 def _in_our_words(found: re.Match[str]) -> str:
