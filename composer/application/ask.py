@@ -40,11 +40,15 @@ def reload(
 
 
 def restart(node: str, timeout_sec: float = 60.0) -> tuple[str, Outcome]:
-    """Let a system build a node anew; return the system's name, and what came of it.
+    """Let a system build a node or start an external process anew.
 
     Args:
-        node: The full name, or what follows the last slash of it if that tells it.
+        node: The full name, or what follows the last slash of it if that tells it; or the name
+            of an external process.
         timeout_sec: How long the system may take to answer.
+
+    Returns:
+        The system's name, and what came of it.
 
     Raises:
         ComposerError: No system has such a node, or it does not answer.
@@ -96,10 +100,10 @@ def _open_process(pid: int) -> int | None:
 
 
 def _find_node(systems: Sequence[RunningSystem], name: str) -> tuple[RunningSystem, str]:
-    """Return the system that has a node, and the node's full name.
+    """Return the system that has a node or a process, and the full name of that.
 
     Args:
-        name: Its full name, or what follows the last slash of it if that tells it.
+        name: See `restart`.
     """
     nodes = [
         (system, node)
@@ -107,19 +111,26 @@ def _find_node(systems: Sequence[RunningSystem], name: str) -> tuple[RunningSyst
         for key in ('nodes', 'components')
         for node in (system.status or {}).get(key, ())
     ]
-    found = [each for each in nodes if each[1] == f'/{name.lstrip("/")}']
+    nodes += [
+        (system, process['name'])
+        for system in systems
+        for process in (system.status or {}).get('external_processes', ())
+    ]
+    found = [each for each in nodes if each[1] == name]
+    found = found or [each for each in nodes if each[1] == f'/{name}']
     found = found or [each for each in nodes if each[1].endswith(f'/{name}')]
     if len(found) == 1:
         return found[0]
     if found:
-        message = f"several nodes are called '{name}'"
+        message = f"several nodes or processes are called '{name}'"
         listed = ', '.join(f'{node} (of {system.name})' for system, node in found)
         raise UsageError(message, help=f'give its full name: {listed}')
     silent = [system.name for system in systems if system.problem == 'no answer']
     if silent:
-        message = f"no system that answers has a node '{name}', and '{silent[0]}' does not answer"
+        what = f"a node or process '{name}'"
+        message = f"no system that answers has {what}, and '{silent[0]}' does not answer"
         raise ComposerError(message, help='try again')
     names = {node for _, node in nodes} | {node.rpartition('/')[2] for _, node in nodes}
     advice = suggest(name, names, 'there are', 'no system runs')
-    message = f"no system on this ROS graph has a node '{name}'"
+    message = f"no system on this ROS graph has a node or process '{name}'"
     raise ComposerError(message, help=advice)

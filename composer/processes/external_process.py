@@ -6,6 +6,7 @@ import queue
 import signal
 import threading
 from dataclasses import dataclass, field
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.processes.backoff import Backoff
@@ -28,6 +29,10 @@ class ProcessRun:
         is_given_up: Whether it was killed on purpose.
         gone: Set when nothing of its process group is left.
         pid: Its process ID.
+        is_replaced: Whether it was ended for another run to begin.
+        measured_at: When `cpu_sec` was read, a time of `time.monotonic`.
+        cpu_sec: The processor time that it had used then.
+        cpu: The share of a core that it used in the time before.
     """
 
     number: int
@@ -41,6 +46,10 @@ class ProcessRun:
     was_killed: bool = False
     has_failed: bool = False
     is_given_up: bool = False
+    is_replaced: bool = False
+    measured_at: float = field(default_factory=monotonic)
+    cpu_sec: float = 0.0
+    cpu: float | None = None
 
 
 class ExternalProcess:
@@ -88,6 +97,19 @@ class ExternalProcess:
             return self.is_done and self.has_succeeded
         is_running = self.run is not None and self.run.code is None
         return is_running or (state is None and self.has_succeeded)
+
+    @property
+    def word(self) -> str:
+        """Its state in a word: not started, running, restarting, succeeded, failed or ended."""
+        if self.run is None:
+            return 'failed' if self.is_done else 'not started'
+        if self.run.code is None:
+            return 'running'
+        if self.is_leaving:
+            return 'ended'
+        if not self.is_done:
+            return 'restarting'
+        return 'succeeded' if self.has_succeeded else 'failed'
 
     @property
     def state(self) -> str:

@@ -13,6 +13,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ExitCode, StartError
+from composer.processes.backoff import Backoff
 from composer.processes.external_process import ExternalProcess, ProcessRun, describe_end
 from composer.processes.reaper_client import ReaperConnection
 from composer.programs import base_environment
@@ -112,6 +113,29 @@ class ProcessSupervisor:
             return
         self._ask_to_end(run, tools)
         run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC)
+
+    def restart(self, process: ExternalProcess) -> str:
+        """End a process, if it runs, and start it; return why that failed, or an empty string.
+
+        Its restarts count anew, as its user may have removed what made it fail.
+        """
+        run, tools = process.run, self._tools
+        if run is not None:
+            run.is_replaced = True
+            if tools is not None and not run.gone.is_set():
+                self._ask_to_end(run, tools)
+                if not run.gone.wait(self._timeout_of(process.spec) + _KILLED_SEC):
+                    return f"{self._noun} '{process.spec.name}' does not end"
+        process.restarts, process.backoff = 0, Backoff(least_sec=process.spec.restart_delay_sec)
+        try:
+            self.start(process)
+        except StartError as error:
+            self._logger.error(str(error))
+            process.is_done = True
+            return str(error)
+        self._logger.warning(f"{self._noun} '{process.spec.name}' was restarted")
+        self.on_restart(process)
+        return ''
 
     def fail(self, run: ProcessRun) -> None:
         """End a run as one that has failed, if something is to be done about that."""
@@ -264,7 +288,7 @@ class ProcessSupervisor:
         run.output_ended.wait(_LAST_OUTPUT_SEC)
         process, name = run.process, run.process.spec.name
         end = f"{self._noun} '{name}' {describe_end(code)}"
-        if self._stopping.is_set() or process.is_leaving:
+        if self._stopping.is_set() or process.is_leaving or run.is_replaced:
             expected = (0, -signal.Signals[process.spec.stop_signal], -signal.SIGTERM)
             self._log(end, is_error=code not in expected and not run.was_killed)
             return
@@ -274,7 +298,7 @@ class ProcessSupervisor:
         delay_sec = process.backoff.next_delay_sec()
         self._has_started.wait(_LONGEST_START_SEC)
         self._log(f'{end}; it is started again in {delay_sec:g} s', is_error=code != 0)
-        if not (self._stopping.wait(delay_sec) or process.is_leaving):
+        if not (self._stopping.wait(delay_sec) or process.is_leaving or run.is_replaced):
             self._restart(process)
 
     def _restart(self, process: ExternalProcess) -> None:

@@ -13,6 +13,7 @@ from rclpy.exceptions import InvalidHandle
 from composer.errors import ExitCode
 from composer.planning.differences import compare
 from composer.processes.guardian_client import end_marked
+from composer.processes.process_usage import describe_processes
 from composer.runtime.behaviours.running_calls import describe_last_calls
 from composer.runtime.behaviours.tracebacks import format_internal_error
 from composer.runtime.control.control_node import ControlNode
@@ -137,6 +138,9 @@ class LocalPart:
         self._handle = self._create_handle(elsewhere, ros_arguments, log_levels)
         self._programs = ExternalPrograms(spec, self._handle, self._nodes, self._end)
         self._processes, self._starter = self._programs.processes, self._programs.starter
+        self.state.find_processes = lambda: describe_processes(
+            list(self._processes.by_name.values())
+        )
         self._stop_request.kill_processes = self._kill_processes
         self._restarter = NodeRestarter(self._nodes, self._starter, self._handle)
         self._parameter_services = ParameterServiceStarter(self._nodes, self._restarter.lock)
@@ -367,16 +371,22 @@ class LocalPart:
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew: its entities, parameters and state are as at the start again.
 
-        A component is unloaded and loaded.
+        A component is unloaded and loaded, an external process of this name ended and started.
         """
+        noun = 'node' if full_name.startswith('/') else 'process'
         if not self.state.is_up and full_name in self.list_hidden():
             failure = f"node '{full_name}' has not started yet"
         elif full_name in self._nodes:
             failure = self._restarter.restart(full_name)
+        elif process := self._processes.by_name.get(full_name):
+            waits = not self.state.is_up and process.run is None
+            failure = f"process '{full_name}' has not started yet" if waits else ''
+            with self._restarter.lock:
+                failure = failure or self._processes.restart(process)
         else:
             with self._restarter.lock:
                 failure = self._programs.components.restart(full_name)
-        return Outcome(not failure, failure or f"node '{full_name}' was restarted")
+        return Outcome(not failure, failure or f"{noun} '{full_name}' was restarted")
 
     @property
     def stop_requested(self) -> bool:

@@ -15,6 +15,11 @@ Form: TypeAlias = Any
 
 _FIGURE = (NoneType, float)
 ANY: Final[Form] = {}
+_EXTERNAL: Final[Form] = {
+    **dict.fromkeys(('name', 'state', 'level', 'message'), str),
+    'restarts': int,
+    **dict.fromkeys(('pid', 'cpu', 'memory_bytes'), _FIGURE),
+}
 STATUS: Final[Form] = {
     **dict.fromkeys(('name', 'file', 'host', 'state', 'last_error'), str),
     'pid': int,
@@ -22,6 +27,7 @@ STATUS: Final[Form] = {
     'nodes': [str],
     'components': [str],
     'lifecycles': {str: str},
+    'external_processes': [_EXTERNAL],
     'health': (NoneType, {'level': str, 'message': str}),
     'last_reload': (NoneType, {'time': float, 'succeeded': bool}),
 }
@@ -30,6 +36,7 @@ TOP: Final[Form] = {
     'period': int,
     'period_sec': float,
     'has_cpu': bool,
+    'external_processes': [_EXTERNAL],
     'processes': [
         {
             'worker': str,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Before a host is asked again whose part has ended, or that was lost.
 _PAUSE_SEC = 2.0
-_LISTS = ('processes', 'entities')
+_LISTS = ('entities', 'processes', 'external_processes')
 
 
 def watch_hosts(system: str, hosts: Sequence[HostSpec], view: View) -> None:

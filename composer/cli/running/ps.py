@@ -11,7 +11,7 @@ import click
 
 from composer.application.running_systems.client import Client
 from composer.application.running_systems.discovery import Discovery
-from composer.cli.running.tables import format_duration, render_table
+from composer.cli.running.tables import format_duration, render_processes, render_table
 from composer.errors import ExitCode
 from composer.terminal import escape
 
@@ -65,7 +65,12 @@ def print_systems(
         *map(_row, systems),
         *([str(each.get(key.lower(), '')) for key in _HEADER] for each in unnamed),
     ]
-    click.echo('\n'.join([*render_table(_HEADER, rows), *notes]))
+    processes = render_processes(
+        (each.name, process)
+        for each in systems
+        for process in (each.status or {}).get('external_processes', ())
+    )
+    click.echo('\n'.join([*render_table(_HEADER, rows), *notes, *processes]))
 
 
 def _document(system: RunningSystem) -> dict[str, object]:

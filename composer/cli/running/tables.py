@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 GAP = '  '
+_PROCESSES = ('SYSTEM', 'PROCESS', 'STATE', 'PID', 'RESTARTS', 'CPU', 'MEMORY MB')
+_MEGABYTE = 1e6
 _MINUTE_SEC, _HOUR_SEC, _DAY_SEC = 60, 3600, 86400
 
 
@@ -26,6 +28,27 @@ def render_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[s
         ).rstrip()
         for row in [header, *body]
     ]
+
+
+def render_processes(processes: Iterable[tuple[str, Mapping[str, Any]]]) -> list[str]:
+    """Return the lines of a table of external processes, none if there are none.
+
+    Args:
+        processes: Each with the name of its system, as `ps` and `top` are told of them.
+    """
+    rows = [
+        (
+            system,
+            process['name'],
+            process['state'],
+            '-' if process['pid'] is None else str(process['pid']),
+            str(process['restarts']),
+            '-' if process['cpu'] is None else f'{process["cpu"]:.1%}',
+            '-' if (size := process['memory_bytes']) is None else f'{size / _MEGABYTE:.1f}',
+        )
+        for system, process in processes
+    ]
+    return render_table(_PROCESSES, rows) if rows else []
 
 
 def format_duration(seconds: float) -> str:

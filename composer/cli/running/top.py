@@ -20,6 +20,7 @@ from composer.application.running_systems.health import (
 from composer.cli.running.top_table import (
     describe_worst,
     find_worst,
+    list_processes,
     render_entities,
     select_entities,
 )
@@ -76,7 +77,8 @@ def print_health(document: dict[str, Any], view: View, format_name: str) -> None
         click.echo(json.dumps({**document, **found}, indent=2))
     else:
         lines = map(describe_worst, find_worst(document))
-        click.echo('\n'.join([*render_entities(entities), *lines]))
+        processes = list_processes(document)
+        click.echo('\n'.join([*render_entities(entities), *lines, *processes]))
 
 
 def _print_each(ask: Callable[[float], Outcome]) -> int:

@@ -15,6 +15,7 @@ from composer.cli.running.top_table import (
     View,
     describe_worst,
     find_worst,
+    list_processes,
     render_entities,
     select_entities,
 )
@@ -144,7 +145,8 @@ class _Screen:
             for text in (*map(describe_worst, find_worst(document)), *document.get('problems', ()))
             for line in wrap(text, width)
         ]
-        room = max(0, height - 3 - len(worst))
+        processes = list_processes(document)
+        room = max(0, height - 3 - len(worst) - len(processes))
         self._top = max(0, min(self._top, len(entities) - room))
         header, *rows = render_entities(entities, self._view.sort, width)
         self._write(0, self._describe(document, len(entities)))
@@ -155,6 +157,8 @@ class _Screen:
             self._write(line, row, self._styles.get(entity['level'], 0))
         for line, text in enumerate(worst, height - 1 - len(worst)):
             self._write(line, text, self._styles.get('warn', 0))
+        for line, text in enumerate(processes, height - 1 - len(worst) - len(processes)):
+            self._write(line, text)
         self._window.refresh()
 
     def _describe(self, document: dict[str, Any], shown: int) -> str:

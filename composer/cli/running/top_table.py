@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.cli.running.tables import GAP, render_table
+from composer.cli.running.tables import GAP, render_processes, render_table
 from composer.records import record
 from composer.terminal import escape
 
@@ -151,6 +151,15 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
         f'{worst["node"]}: {worst["entity"]}{where} uses {worst["cpu"]:.0%} of a core: other '
         f'callbacks wait {worst["wait_mean_ms"]:.1f} ms for the interpreter (GIL) on average, '
         f'{worst["wait_max_ms"]:.1f} ms at most'
+    )
+
+
+def list_processes(document: Mapping[str, Any]) -> list[str]:
+    """Return the lines of the table of external processes, with the hosts if there are several."""
+    name = document['name'].partition('@')[0]
+    return render_processes(
+        (f'{name}@{each["host"]}' if 'host' in each else name, each)
+        for each in document['external_processes']
     )
 
 

@@ -61,6 +61,11 @@ def status_answer(
     """
     healths = [each['health'] for each in (own, *workers.values()) if each['health']]
     healths += [
+        {'level': each['level'], 'message': f"process '{each['name']}': {each['message']}"}
+        for each in own['external_processes']
+        if each['message']
+    ]
+    healths += [
         {'level': _LEVELS[-1], 'message': f"worker '{each['name']}': {_WORKER_STATES[state]}"}
         for each in states
         if (state := each['state']) in _WORKER_STATES
@@ -96,6 +101,7 @@ def describe_top(
         'period': latest.number,
         'period_sec': diagnostics.period_sec,
         'has_cpu': latest.costs is not None,
+        'external_processes': state.find_processes(),
         'processes': [] if latest.costs is None else [_describe_process(latest.costs)],
         'entities': [_describe_entity(key, report) for key, report in latest.by_entity.items()]
         + [_describe_delivery(key, each, latest.rates) for key, each in deliveries.items()]

@@ -153,8 +153,9 @@ class ControlServices:
     def _restart(self, name: str) -> Outcome:
         if not self._system.state.is_open:
             return Outcome(succeeded=False, text=_STARTING)
-        if name not in (*self._system.list_nodes(), *self._system.list_components()):
-            return Outcome(succeeded=False, text=f"the system has no node '{name}'")
+        processes = [each['name'] for each in self._system.state.find_processes()]
+        if name not in (*self._system.list_nodes(), *self._system.list_components(), *processes):
+            return Outcome(succeeded=False, text=f"the system has no node or process '{name}'")
         return self._system.restart_node(name)
 
     def _stop_system(self) -> Outcome:

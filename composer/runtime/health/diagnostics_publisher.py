@@ -131,6 +131,7 @@ class DiagnosticsPublisher:
             StatusWriter,
             delivery_status,
             lifecycle_status,
+            process_status,
             system_status,
         )
 
@@ -165,6 +166,10 @@ class DiagnosticsPublisher:
             statuses += [
                 lifecycle_status(node, each, self._state.name)
                 for node, each in self._state.find_lifecycles().items()
+            ]
+            statuses += [
+                process_status(name, each, self._state.name)
+                for each in self._state.find_processes()
             ]
             stamp = self._node.get_clock().now().to_msg()
             for start in range(0, len(statuses), _MOST_STATUSES):

@@ -68,6 +68,7 @@ class SystemState:
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
         find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
+        find_processes: Returns the external processes, as `describe_processes` does.
         clock_problem: What keeps the clocks of nodes from going; empty if nothing does.
         clocks: Those of other hosts that have been compared, by the names of these.
     """
@@ -80,6 +81,7 @@ class SystemState:
         self.is_stopping = False
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
+        self.find_processes: Callable[[], list[dict[str, Any]]] = list
         self.clocks: dict[str, ClockSkew] = {}
         self.clock_problem = ''
         self.begun = time.monotonic()
@@ -139,6 +141,7 @@ class SystemState:
             'log': find_log(),
             'last_error': self.last_error,
             'lifecycles': dict(self.find_lifecycles()),
+            'external_processes': self.find_processes(),
             'last_reload': last
             and {
                 'time': last.time,

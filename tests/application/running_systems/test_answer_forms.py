@@ -7,6 +7,16 @@ import pytest
 from composer.application.running_systems.answer_forms import STATUS, TOP, read_answer
 from composer.errors import ComposerError
 
+EXTERNAL = {
+    'name': 'driver',
+    'state': 'running',
+    'pid': 8,
+    'restarts': 1,
+    'cpu': None,
+    'memory_bytes': 4096,
+    'level': 'ok',
+    'message': '',
+}
 STATUS_ANSWER = {
     'version': 1,
     'name': 'arm',
@@ -19,6 +29,7 @@ STATUS_ANSWER = {
     'nodes': ['/a'],
     'components': ['/b'],
     'lifecycles': {'/a': 'active'},
+    'external_processes': [EXTERNAL],
     'more': None,
     'health': {'level': 'ok', 'message': ''},
     'last_reload': {'time': 1, 'succeeded': True},
@@ -56,6 +67,7 @@ TOP_ANSWER = {
     'period': 3,
     'period_sec': 1,
     'has_cpu': False,
+    'external_processes': [EXTERNAL],
     'processes': [PROCESS],
     'entities': [ENTITY],
 }

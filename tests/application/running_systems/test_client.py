@@ -50,5 +50,6 @@ def test_a_system_that_does_not_answer_may_have_the_node(peer):
     with pytest.raises(ComposerError) as error:
         restart('stuck')
     assert (
-        str(error.value) == "no system that answers has a node 'stuck', and 'arm' does not answer"
+        str(error.value)
+        == "no system that answers has a node or process 'stuck', and 'arm' does not answer"
     )

@@ -123,7 +123,11 @@ ABSENT = 'on this ROS graph (ROS_DOMAIN_ID {domain})'
 WRONG = {
     'no system': (('reload',), 1, f'error: no system runs {ABSENT}\n'),
     'no such system': (('down', 'robot'), 1, f"error: there is no system 'robot' {ABSENT}\n"),
-    'no node': (('restart', 'arm'), 1, "error: no system on this ROS graph has a node 'arm'\n"),
+    'no node': (
+        ('restart', 'arm'),
+        1,
+        "error: no system on this ROS graph has a node or process 'arm'\n",
+    ),
     'no time': (('reload', '--timeout', '0'), 2, 'error: '),
 }
 
@@ -134,6 +138,48 @@ def test_what_cannot_be_asked_is_told(composer, domain_id, name):
     found, output, errors = composer(*words)
     assert (found, output) == (code, '')
     assert errors.startswith(message.format(domain=domain_id))
+
+
+def test_external_processes_are_listed_and_restarted(compose, composer, wait_for):
+    """One that has failed for good is no healthy system, until it is restarted."""
+    busy = 'trap exit INT TERM; while :; do :; done & wait'
+    failing = 'while [ ! -e mended ]; do exit 3; done; sleep 3600'
+    text = SYSTEM + (
+        'processes:\n'
+        f'  busy: {{command: [sh, -c, "{busy}"]}}\n'
+        f'  driver: {{command: [sh, -c, "{failing}"], restart: {{when: on_failure, max: 1}}}}\n'
+        '  listed: {command: ["true"]}\n'
+    )
+    child = compose(text, CODE)
+    child.wait_until_ready()
+
+    def ask():
+        (system,) = json.loads(composer('ps', '--format', 'json')[1])['systems']
+        return system['health'], {each['name']: each for each in system['external_processes']}
+
+    wait_for(
+        lambda: ask()[1]['driver']['state'] == 'failed' and ask()[1]['busy']['cpu'], 'the end'
+    )
+    health, processes = ask()
+    message = "process 'driver': it has ended with exit code 3"
+    assert health == {'level': 'error', 'message': message}
+    assert [processes['driver'][key] for key in ('pid', 'restarts')] == [None, 1]
+    assert processes['listed']['state'] == 'succeeded'
+    assert processes['busy']['memory_bytes'] > 0
+    for listed in (composer('ps')[1], composer('top', '--once')[1]):
+        assert re.search(r'^system +driver +failed +- +1 +- +-$', listed, re.MULTILINE)
+        row = rf'^system +busy +running +{processes["busy"]["pid"]} +0 +[0-9.]+% +[0-9.]+$'
+        assert re.search(row, listed, re.MULTILINE)
+
+    (compose.folder / 'mended').touch()
+    assert composer('restart', 'driver')[0] == 0
+    assert composer('restart', 'busy')[1] == "system: process 'busy' was restarted\n"
+    health, after = ask()
+    assert (after['driver']['state'], after['driver']['restarts']) == ('running', 0)
+    assert after['busy']['pid'] != processes['busy']['pid']
+    assert health['level'] != 'error'
+    assert 'arm, busy, driver, listed, stuck' in composer('restart', 'absent')[2]
+    assert child.stop() == 0
 
 
 def test_several_systems_are_told_apart(compose, composer):
@@ -218,6 +264,7 @@ def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
         'health': None,
         'components': [],
         'lifecycles': {},
+        'external_processes': [],
     }
     pretend('first', '{')
     pretend('second', json.dumps({**known, 'nodes': []}))

@@ -172,9 +172,10 @@ def process(worker='', **figures):
 
 
 def test_hosts_have_workers_of_the_same_name_and_a_column():
+    none = {'external_processes': []}
     told = {
-        'base': {'processes': [process()], 'entities': ENTITIES[:1]},
-        'jetson': {'processes': [process()], 'entities': ENTITIES[1:]},
+        'base': {'processes': [process()], 'entities': ENTITIES[:1], **none},
+        'jetson': {'processes': [process()], 'entities': ENTITIES[1:], **none},
     }
     document = merge_health(told)
     lines = render_entities(document['entities'])
@@ -182,7 +183,8 @@ def test_hosts_have_workers_of_the_same_name_and_a_column():
     assert [line.split()[3] for line in lines[1:]] == ['base', 'jetson', 'jetson']
     # The node that waits for the interpreter is on another host.
     assert find_worst(document) == []
-    both = merge_health({**told, 'rear': {'processes': [process()], 'entities': ENTITIES}})
+    rear = {'processes': [process()], 'entities': ENTITIES, **none}
+    both = merge_health({**told, 'rear': rear})
     (worst,) = find_worst(both)
     assert ' on host rear uses 75% of a core' in describe_worst(worst)
 

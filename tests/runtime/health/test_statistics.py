@@ -238,6 +238,18 @@ def test_only_subscriptions_have_overruns_and_services_neither():
         (Owner('timer', 'a'), {}, DiagnosticStatus.OK, 'not called'),
         (
             Owner('timer', 'a'),
+            {'missed': MissedCounts(late_ticks=2)},
+            DiagnosticStatus.OK,
+            'not called',
+        ),
+        (
+            Owner('timer', 'a'),
+            {'missed': MissedCounts(late_ticks=3)},
+            DiagnosticStatus.WARN,
+            '3 late ticks',
+        ),
+        (
+            Owner('timer', 'a'),
             {'missed': MissedCounts(late_ticks=1, skipped_ticks=3)},
             DiagnosticStatus.WARN,
             '1 late tick; 3 skipped ticks',
