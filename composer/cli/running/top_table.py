@@ -10,6 +10,7 @@ from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
 
 @record
@@ -21,7 +22,8 @@ class Column:
         value: Returns what it is sorted by; `None` for what is not known.
         show: Returns what is shown of a value.
         rank: Where the terminal is too narrow, columns of a higher rank are left out first.
-        least: The narrowest that it may be; `None` if its cells are never shortened.
+        least: The narrowest that it may be, if there is room; `None` if its cells are never
+            shortened.
     """
 
     title: str
@@ -75,6 +77,8 @@ SORT_NAMES = {
 }
 DEFAULT_SORT = 'cpu'
 # Names are at least so long before columns of a higher rank than this have a place.
+# Narrower cells are cut as a whole, not node and entity each.
+_SPLIT = 8
 _READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 13
 # A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
 _WAITED_MS = 0.5
@@ -196,8 +200,11 @@ def _fit(cells: Mapping[Column, list[str]], sort: Column, width: int) -> dict[Co
     """Return the columns that fit into lines of `width`, with their cells shortened."""
     room = width + len(GAP)
     wanted = {each: max(map(len, texts)) for each, texts in cells.items()}
-    steps = [(each.rank * (each is not sort), each, each.least or wanted[each]) for each in cells]
-    steps += [(_READABLE_RANK, COLUMNS[0], _READABLE)]
+    least = {each: each.least or wanted[each] for each in cells}
+    names, beside = COLUMNS[0], 0 if sort is COLUMNS[0] else wanted[sort] + len(GAP)
+    least[names] = _find_least(set(cells[names]), width - beside) or min(least[names], width)
+    steps = [(each.rank * (each is not sort), each, least[each]) for each in cells]
+    steps += [(_READABLE_RANK, names, max(_READABLE, least[names]))]
     steps += [(each.rank + _LAST_RANK, each, wanted[each]) for each in cells if each.least]
     widths: dict[Column, int] = {}
     for _, each, target in sorted(steps, key=lambda step: step[0]):
@@ -214,12 +221,20 @@ def _fit(cells: Mapping[Column, list[str]], sort: Column, width: int) -> dict[Co
     }
 
 
+def _find_least(names: AbstractSet[str], most: int) -> int | None:
+    """Return how long names must be to be told apart; `None` if that is too long."""
+    for width in range(COLUMNS[0].least or 0, most + 1):
+        if len({_shorten(name, width) for name in names}) == len(names):
+            return width
+    return None
+
+
 def _shorten(text: str, width: int) -> str:
     """Return a text of at most `width` characters; names keep their beginning and their end."""
     if len(text) <= width:
         return text
     node, colon, task = text.partition(': ')
-    if not colon:
+    if not colon or width < _SPLIT:
         end = (width - 1) // 2
         return f'{text[: width - 1 - end]}…{text[len(text) - end :]}'
     room = width - len(colon)

@@ -166,6 +166,20 @@ def test_lines_fit_and_show_the_column_that_they_are_sorted_by(width, more, sort
         assert [header, *lines] == render_entities(entities)
 
 
+@pytest.mark.parametrize('sort', SORT_NAMES)
+@pytest.mark.parametrize('width', [*range(1, 28), 80])
+def test_names_that_differ_in_their_middle_are_told_apart_if_there_is_room(width, sort):
+    entities = [
+        entity(f'/robot/{place}_wheel', 'cmd_vel', kind='subscription', cpu=0.1)
+        for place in ('front_left', 'front_right', 'rear_left', 'rear_right')
+    ]
+    lines = render_entities(entities, sort, width)
+    assert max(map(len, lines)) <= width
+    assert len(lines) == 1 + len(entities)
+    if width == 80:
+        assert len(set(lines)) == len(lines)
+
+
 def process(worker='', **figures):
     waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, **waits, **figures}
