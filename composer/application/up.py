@@ -18,7 +18,7 @@ from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.values.start_reader import StartValueReader
-from composer.network.local_networks import wait_for_network, wait_for_port
+from composer.network.local_networks import check_loopback, wait_for_network, wait_for_port
 from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot_taking import take_snapshot
@@ -112,6 +112,7 @@ def up(  # noqa: PLR0913 - one for each option
         from composer.application.reloader import Reloader
 
         if not rehearses:
+            check_loopback(context.spec, {**os.environ, **ros_variables(context.spec)})
             wait_for_network(context.spec, lambda text: click.echo(text, err=True))
             wait_for_port(context.spec)
         variables = _find_variables(context.spec, rehearses=rehearses)

@@ -14,9 +14,10 @@ from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from composer.errors import StartError
+from composer.network.transport_profile import is_default_transport
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from composer.language.specs import SystemSpec
 
@@ -47,6 +48,21 @@ def wait_for_network(spec: SystemSpec, tell: Callable[[str], object]) -> None:
             )
             return
         sleep(_POLL_SEC)
+
+
+def check_loopback(spec: SystemSpec, variables: Mapping[str, str]) -> None:
+    """Check that workers can find each other, for which Fast DDS needs the loopback interface.
+
+    Args:
+        variables: Those that the system starts with.
+
+    Raises:
+        StartError: It is down.
+    """
+    has_workers = any(node.worker for node in spec.nodes.values())
+    if has_workers and is_default_transport(variables) and not _has_interface(_LOOPBACK):
+        message = 'workers cannot find each other: the loopback interface is down'
+        raise StartError(message, help="run 'ip link set lo up'")
 
 
 def wait_for_port(spec: SystemSpec) -> None:
@@ -85,14 +101,19 @@ def _is_free(port: int) -> bool:
 
 def is_on_network() -> bool:
     """Return whether an interface runs, beside that to this computer itself."""
+    return _has_interface(0)
+
+
+def _has_interface(kind: int) -> bool:
+    """Return whether an interface runs, of those of the loopback or of all others."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-        return any(_runs(any_socket, name) for _, name in socket.if_nameindex())
+        return any(_runs(any_socket, name, kind) for _, name in socket.if_nameindex())
 
 
-def _runs(any_socket: socket.socket, name: str) -> bool:
+def _runs(any_socket: socket.socket, name: str, kind: int) -> bool:
     request = _REQUEST.pack(name.encode(), 0)
     try:
         _, flags = _REQUEST.unpack(fcntl.ioctl(any_socket, _GET_FLAGS, request))
     except OSError:
         return False  # It has just gone.
-    return bool(flags & _RUNNING) and not flags & _LOOPBACK
+    return bool(flags & _RUNNING) and flags & _LOOPBACK == kind

@@ -44,14 +44,14 @@ def shared_memory_variables(spec: SystemSpec, variables: Mapping[str, str]) -> d
         ComposerError: There is too little shared memory.
     """
     workers = {each.worker for each in spec.nodes.values()} - {''}
-    if not workers or not _is_default(variables):
+    if not workers or not is_default_transport(variables):
         return {}
     own = [each for each in spec.processes.values() if not each.external]
     _check_room(1 + len(workers) + len(own))
     return dict.fromkeys(PROFILE_VARIABLES, PROFILE)
 
 
-def _is_default(variables: Mapping[str, str]) -> bool:
+def is_default_transport(variables: Mapping[str, str]) -> bool:
     """Return whether nobody has said how Fast DDS sends, nor has it replaced."""
     return (
         variables.get('RMW_IMPLEMENTATION', '') in _MIDDLEWARES

@@ -121,3 +121,39 @@ def test_a_machine_without_temporary_folder_is_told_in_one_line(run, command):
     errors = [line for line in output.splitlines() if 'error: ' in line]
     assert (code, len(errors)) == (1, 1), output
     assert re.search('No usable temporary directory|no folder for temporary files', errors[0])
+
+
+NO_PROC = 'mount -t tmpfs none /proc && exec "$@"'
+LACKING = {
+    '/proc: ': (['unshare', '-r', '-m', 'sh', '-c', NO_PROC, 'sh'], ''),
+    'the loopback interface is down': (['unshare', '-r', '-n'], ''),
+    'timerfd_create: ': ([], 'import ctypes; ctypes.CDLL.timerfd_create = lambda *_: -1'),
+}
+
+
+@pytest.mark.parametrize('lacking', LACKING)
+def test_what_else_a_machine_lacks_is_told_in_one_line(run, lacking):
+    prefix, before = LACKING[lacking]
+    if prefix and subprocess.run([*prefix, 'true'], check=False, capture_output=True).returncode:
+        pytest.skip('this machine allows no namespaces')
+    code, output = run('up worker.yaml', before, prefix)
+    assert (code, output.count('error: ')) == (1, 1), output
+    assert lacking in output.partition('error: ')[2].splitlines()[0]
+
+
+@pytest.mark.parametrize('file', ['system.yaml', 'worker.yaml'])
+@pytest.mark.parametrize(
+    'patch',
+    [
+        'import select; del select.epoll',
+        'import _thread; _thread.start_new_thread = lambda *_: 0',
+    ],
+)
+def test_a_module_that_replaces_threads_is_refused(run, tmp_path, patch, file):
+    """As gevent's `monkey.patch_all` does, without and with its threads."""
+    with (tmp_path / 'parts.py').open('a') as parts:
+        parts.write(patch)
+    code, output = run(f'up {file}')
+    assert code == 1
+    assert "error[broken-behaviour]: importing 'parts' replaced the threads of Python" in output
+    assert 'help: leave out monkey.patch_all() of gevent or eventlet' in output

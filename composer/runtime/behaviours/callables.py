@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import _thread
 import importlib
 import inspect
+import select
 import sys
 import threading
 import traceback
@@ -42,6 +44,7 @@ def import_module(name: str) -> ModuleType:
     Raises:
         BehaviourImportError: The import fails, whatever the module's code raises.
     """
+    before = _thread.start_new_thread, select.epoll, threading.get_ident
     try:
         return importlib.import_module(name)
     except BaseException as error:
@@ -54,6 +57,25 @@ def import_module(name: str) -> ModuleType:
         where = _innermost_place(error)
         message = f"importing '{name}' raised {summarize(error)}{where}"
         raise BehaviourImportError(message) from error
+    finally:
+        _refuse_other_threads(name, before)
+
+
+def _refuse_other_threads(name: str, before: tuple[object, object, Callable[[], int]]) -> None:
+    """Refuse a module that has replaced the threads of Python: with others, ROS cannot run.
+
+    Raises:
+        BehaviourImportError: It has.
+    """
+    start, epoll, get_ident = before
+    if (_thread.start_new_thread, getattr(select, 'epoll', None)) == (start, epoll):
+        return
+    if threading.current_thread() is not threading.main_thread():
+        # The thread could not end.
+        threading.get_ident = get_ident
+    message = f"importing '{name}' replaced the threads of Python or select.epoll"
+    advice = 'leave out monkey.patch_all() of gevent or eventlet: ROS needs those of Python'
+    raise BehaviourImportError(message, help=advice)
 
 
 def import_behaviour(spec: BehaviourSpec) -> Callable[..., Any]:
