@@ -27,7 +27,7 @@ from composer.runtime.health.watched_clocks import Clocks
 from composer.runtime.logs import system_logger
 from composer.runtime.middleware.lost_participants import find_participants
 from composer.runtime.middleware.ros_context import create_ros_context, leave_graph_at_exit
-from composer.runtime.middleware.ros_graph import find_ends
+from composer.runtime.middleware.ros_graph import SameNames, find_ends
 from composer.runtime.middleware.shared_memory import replacing_ports
 from composer.runtime.nodes.parameter_services import ParameterServiceStarter
 from composer.runtime.nodes.system_handle import SystemHandle
@@ -150,7 +150,8 @@ class LocalPart:
         )
         if self._executor.runs_in_real_time:
             clocks = Clocks(self._find_ros_nodes, self.state, tells_steps=not worker)
-            observers = (clocks, _LostServers(self._nodes), *observers)
+            same_names = SameNames(self._find_ros_nodes)
+            observers = (clocks, _LostServers(self._nodes), same_names, *observers)
         self._graph_watcher = GraphWatcher(
             lambda: [end for node in list(self._nodes.values()) for end in node.endpoints],
             lambda: self._any_ros,

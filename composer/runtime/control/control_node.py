@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.node import Node as RosNode
 from rclpy.parameter import Parameter
 
-from composer.errors import ExitCode, StartError
+from composer.errors import StartError
 from composer.runtime.control import protocol
 from composer.runtime.control.answers import (
     describe_status,
@@ -25,7 +25,6 @@ from composer.runtime.control.answers import (
 from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
-from composer.runtime.control.rivals import Rivals
 from composer.runtime.health.diagnostics_publisher import CallWatcher, DiagnosticsPublisher
 from composer.runtime.health.other_clocks import OtherClocks
 from composer.runtime.health.system_state import Outcome, find_log
@@ -218,7 +217,6 @@ class ControlNode:
             self._node, self._system, self._commands, self._status, self._top
         )
         state = self._system.state
-        Rivals(self._node, state.who(), state.begun, self._give_way)
         spec = self._system.snapshot.spec
         if spec.host:
             OtherClocks(self._node, spec, state)
@@ -256,10 +254,6 @@ class ControlNode:
 
     def _top(self) -> Outcome:
         return top_answer(self.describe_top(), self._system.workers.ask('top'))
-
-    def _give_way(self, rival: Mapping[str, Any]) -> None:
-        system_logger.error(f'{self._describe_rival(rival)}; so this one ends')
-        self._system.request_stop(ExitCode.FAILED)
 
     def _describe_rival(self, rival: Mapping[str, Any]) -> str:
         what = f"a system '{self._system.state.name}' runs already on this ROS graph"

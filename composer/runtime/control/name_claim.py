@@ -2,8 +2,8 @@
 
 It is an abstract socket of Linux, which one process can be bound to. The kernel takes it back when
 the process ends, however that happens; network namespaces, as of containers, have names of their
-own, as they have ROS graphs of their own. Who connects is told who has the name. Systems on
-other hosts are known later, see `rivals`.
+own, as they have ROS graphs of their own. Who connects is told who has the name. Of
+systems on other hosts `SameNames` warns.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,10 +12,11 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter import Parameter
 
 from composer.names import join_names, split_name
+from composer.runtime.logs import system_logger
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable
 
     from rclpy.context import Context
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 _NODE_NAME = '_composer_waiting'
+# One a second; other nodes are found some time after the start.
+_MOST_LOOKS = 10
 # An action exists if the service for its goals does
 # (https://design.ros2.org/articles/actions.html).
 _GOALS = '/_action/send_goal'
@@ -151,6 +155,41 @@ def find_ends(ros: RosNode, full_name: str) -> list[tuple[str, str]]:
         ):
             ends += [(noun, end) for end, types in listed if not _TYPES_OF_EVERY_NODE & {*types}]
     return ends
+
+
+class SameNames:
+    """Warns once, after the start, of a node elsewhere with the name of one of this process.
+
+    Args:
+        find_nodes: Returns the nodes of this process.
+    """
+
+    def __init__(self, find_nodes: Callable[[], Iterable[RosNode]]) -> None:
+        self._find_nodes = find_nodes
+        # Nodes that an edit brings may be in the graph twice for a moment.
+        self._own: list[tuple[str, str]] = []
+        self._looks_left = _MOST_LOOKS
+
+    def check(self, node: RosNode) -> None:
+        """Look at the graph through a node."""
+        if self._looks_left == _MOST_LOOKS:
+            self._own = [(each.get_name(), each.get_namespace()) for each in self._find_nodes()]
+        if not self._looks_left:
+            return
+        self._looks_left -= 1
+        present = Counter(node.get_node_names_and_namespaces())
+        twice = [
+            join_names(namespace, name)
+            for name, namespace in self._own
+            if present[name, namespace] > 1
+        ]
+        if twice:
+            self._looks_left = 0
+            more = f' (and {len(twice) - 1} more)' if twice[1:] else ''
+            system_logger.warning(
+                f"a node '{twice[0]}'{more} runs already on this ROS graph: services, actions and "
+                'parameters are there twice; give one a namespace, or another ROS_DOMAIN_ID'
+            )
 
 
 def create_graph_node(context: Context, name: str = _NODE_NAME) -> RosNode:

@@ -9,12 +9,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-import rclpy
-from std_msgs.msg import String
-
-from composer.executor import ComposerExecutor
 from composer.runtime.control.name_claim import NameClaim, list_claims
-from composer.runtime.control.rivals import CLAIMS_QOS, Rivals
 from tests.running import DEADLINE_SEC
 
 pytestmark = pytest.mark.ros
@@ -92,54 +87,16 @@ def test_of_two_that_start_together_one_comes_up(compose):
     assert other.stop() == 0
 
 
-class Host:
-    """A control node without the claim of its host, as if it were on another one."""
-
-    def __init__(self, name, domain_id, age_sec):
-        self.refused_by = []
-        self._context = rclpy.Context()
-        rclpy.init(context=self._context, domain_id=domain_id)
-        self._node = rclpy.create_node('_composer_a', context=self._context)
-        self._executor = ComposerExecutor(context=self._context)
-        begun = time.monotonic() - age_sec
-        Rivals(self._node, {'host': name}, begun, self.refused_by.append)
-        self._executor.add_node(self._node)
-        self._executor.create_task(lambda: None)
-        self._talker = self._node.create_publisher(String, '~/claims', CLAIMS_QOS)
-
-    def say(self, text):
-        self._talker.publish(String(data=text))
-
-    def spin(self):
-        self._executor.spin_once(0.01)
-
-    def close(self):
-        self._executor.shutdown(DEADLINE_SEC)
-        self._node.destroy_node()
-        self._context.try_shutdown()
-
-
-@pytest.mark.parametrize('ages', [(0.0, 0.0, 0.0), (9.0, 100.0, 0.0), (100.0, 50.0, 20.0)])
-def test_of_systems_on_several_hosts_the_one_that_was_there_first_stays(domain_id, wait_for, ages):
-    hosts = [Host(f'host {index}', domain_id, age) for index, age in enumerate(ages)]
-    try:
-
-        def one_is_left():
-            for host in hosts:
-                host.spin()
-            return sum(not host.refused_by for host in hosts) == 1
-
-        wait_for(one_is_left, 'two of three to be refused')
-        # Anybody may say anything there.
-        hosts[0].say('[' * 10_000)
-        for _ in range(50):
-            for host in hosts:
-                host.spin()
-        left = [index for index, host in enumerate(hosts) if not host.refused_by]
-        assert len(left) == 1
-        assert sum(len(host.refused_by) for host in hosts) == 2
-        if max(ages):
-            assert left == [ages.index(max(ages))]
-    finally:
-        for host in hosts:
-            host.close()
+@pytest.mark.parametrize('is_a_system', [True, False])
+def test_a_node_whose_name_is_on_the_graph_already_is_a_warning(compose, peer, is_a_system):
+    if is_a_system:
+        compose(SYSTEM, CODE).wait_until_ready()
+        path = compose.write(SYSTEM, CODE, name='other')
+        child = compose.run(path.name)
+        name = '/lonely'
+    else:
+        child = compose(SYSTEM.replace('lonely', 'peer'), CODE)
+        name = '/peer'
+    child.wait_for_line(f"a node '{name}' runs already on this ROS graph")
+    assert child.stop() == 0
+    assert len(child.matching('runs already')) == 1
