@@ -94,12 +94,27 @@ def droppable(path: DataPath) -> DataPath:
     return path
 
 
+_HELP_FOR_LAYERS = (
+    "write 'version: 1' at the top; a layer is given after its system, as in 'composer check "
+    "SYSTEM.yaml LAYER.yaml', or named under 'check:' of the system"
+)
+
+
 def missing_key(error: ValidationError, key: str, message: str) -> Violation:
     """Return the violation for a missing key."""
     path = path_of(error)
-    known = _STAND_INS.get(error.schema.get('title', ''), {})
+    title = error.schema.get('title', '')
+    known = _STAND_INS.get(title, {})
     stand_in = (key, known[key]) if key in known else None
-    return Violation('missing-key', message, path, droppable(path), at_key=True, stand_in=stand_in)
+    return Violation(
+        'missing-key',
+        message,
+        path,
+        droppable(path),
+        at_key=True,
+        help=_HELP_FOR_LAYERS if (title, key) == ('Composer system', 'version') else None,
+        stand_in=stand_in,
+    )
 
 
 def conflicting_keys(error: ValidationError, keys: list[str]) -> Violation:

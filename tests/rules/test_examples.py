@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from composer.checks.checker import check_system
+from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_combinations
 from composer.reports.text import render_finding
@@ -45,6 +46,17 @@ EXAMPLES = [
     )
     for name in sorted(list_rule_names() - WITHOUT)
 ]
+
+
+@pytest.mark.parametrize('rule', sorted(list_rule_names() - WITHOUT))
+def test_without_a_version_nothing_but_findings_comes(rule, tmp_path, monkeypatch, capsys):
+    """The whole file counts as left out then, whatever else is in it."""
+    monkeypatch.chdir(RULES_FOLDER / rule)
+    for kind in ('bad', 'good'):
+        text = Path(f'{kind}.yaml').read_bytes().replace(b'version: 1\n', b'', 1)
+        (tmp_path / 's.yaml').write_bytes(text)
+        assert run(['check', '-q', str(tmp_path / 's.yaml')]) in (0, 1)
+        assert 'bug in' not in capsys.readouterr().err
 
 
 def find(rule, kind, monkeypatch):

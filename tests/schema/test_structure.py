@@ -9,6 +9,10 @@ from composer.language.pipeline import load_system_text
 from composer.schema import schema_path
 
 HEAD = 'version: 1\n'
+LAYERS = (
+    "write 'version: 1' at the top; a layer is given after its system, as in 'composer check "
+    "SYSTEM.yaml LAYER.yaml', or named under 'check:' of the system"
+)
 
 
 def findings(text):
@@ -58,7 +62,7 @@ def test_a_right_file_has_no_findings():
 @pytest.mark.parametrize(
     ('text', 'finding'),
     [
-        ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', None)),
+        ('nodes: {}', ('missing-key', "the key 'version' is missing", '1:1', LAYERS)),
         (
             'version: 1',
             (

@@ -115,7 +115,7 @@ def _check_use(
     context: CheckContext, worker: WorkerSpec, named: dict[str, None]
 ) -> Iterator[Diagnostic]:
     # What is missing because of an error may be what uses it.
-    if not any(path[0] in ('nodes', 'include') for path in context.system.dropped):
+    if not any(path[:1] in ((), ('nodes',), ('include',)) for path in context.system.dropped):
         yield context.at_key(
             worker.path,
             'unused-worker',
