@@ -59,8 +59,12 @@ class Publisher:
             node.ros, self.ros, is_local=spec.local_delivery
         )
         send, convert = self._local.publish, converter_for(message_class).convert
+        check, is_heard = converter_for(message_class, builds=False).convert, self._local.is_heard
 
         def publish(payload: Payload, unheld: int = UNHELD_ARGUMENT) -> None:
+            if type(payload) is not message_class and not is_heard():
+                check(payload)
+                return
             message = convert(payload)
             is_held = message is payload and getrefcount(payload) > unheld
             send(message, is_held=is_held)

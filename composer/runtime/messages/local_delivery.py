@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from composer.runtime.messages.delivery_policies import (
@@ -66,6 +67,7 @@ class LocalPublisher:
         self.tap: Callable[[Any], None] | None = None
         self.published = 0
         self._own_reason = why_sent(ros.qos_profile)
+        self._always_sends = _always_sends(ros.qos_profile)
         self._returns = returns
         self._ownership = ownership_of(ros.msg_type)
         self._count: Callable[[], int] = ros.handle.get_subscription_count
@@ -116,6 +118,13 @@ class LocalPublisher:
         self._has_sent = self._has_sent or bool(self.reason)
         self.reason = next(filter(None, reasons), '')
         self._size = len(matched)
+
+    def is_heard(self) -> bool:
+        """Return whether a message would go anywhere; count it, if not."""
+        if self.tap is not None or self._always_sends or self._inboxes or self._count():
+            return True
+        self.published += 1
+        return False
 
     def publish(self, message: Any, *, is_held: bool) -> None:
         """Hand a message over, or send it.
@@ -217,6 +226,18 @@ class LocalSubscription:
         self.reason = reason
         self.read_only = read_only
         self.waits = waits
+
+
+def _always_sends(profile: QoSProfile) -> bool:
+    """Tell whether a message counts although nobody hears it.
+
+    Those who come later get it, or it is a sign of life.
+    """
+    return bool(
+        profile.durability != DurabilityPolicy.VOLATILE
+        or profile.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC
+        or profile.deadline.nanoseconds > 0
+    )
 
 
 class _Topic:

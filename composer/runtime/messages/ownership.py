@@ -43,9 +43,14 @@ _IN_A_FIELD: Final = _count_of_one()
 
 
 class Ownership:
-    """How messages of one class are copied and moved; get it from `ownership_of`."""
+    """How messages of one class are copied and moved; get it from `ownership_of`.
 
-    __slots__ = ('_class', '_copiers', '_movers', '_others')
+    Attributes:
+        defaults: The name of each field, that of its slot, its default, and what copies that;
+            `None` if it cannot change.
+    """
+
+    __slots__ = ('_class', '_copiers', '_movers', '_other_values', '_others', 'defaults')
 
     def __init__(self, message_class: type) -> None:
         fields = describe_class(message_class).fields
@@ -53,6 +58,11 @@ class Ownership:
         known = {f'_{each.name}': each.type for each in fields}
         self._others = tuple(each for each in message_class.__slots__ if each not in known)  # type: ignore[attr-defined]
         self._copiers = tuple((name, _copier_for(each)) for name, each in known.items())
+        default = message_class()
+        self._other_values = tuple((each, getattr(default, each)) for each in self._others)
+        self.defaults = tuple(
+            (name[1:], name, getattr(default, name), copier) for name, copier in self._copiers
+        )
         self._movers = tuple(
             (name, mover) for name, each in known.items() if (mover := _mover_for(each))
         )
@@ -76,6 +86,17 @@ class Ownership:
         for name, copier in self._copiers:
             value = getattr(message, name)
             setattr(new, name, value if copier is None else copier(value))
+        return new
+
+    def blank(self) -> Any:
+        """Return a message whose fields are to be set, all of them.
+
+        The constructor makes the defaults of all fields, down to the innermost message, for those
+        that are set then, too: twice the time.
+        """
+        new: Any = object.__new__(self._class)
+        for name, value in self._other_values:
+            setattr(new, name, value)
         return new
 
     def move(self, message: Any) -> Any:

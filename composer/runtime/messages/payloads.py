@@ -15,8 +15,9 @@ field. The same holds for the messages inside it. In detail:
 Both stop at the first error.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, Final
 
 from composer.errors import ComposerError
@@ -31,6 +32,7 @@ from composer.interfaces.field_errors import (
 )
 from composer.interfaces.field_values import Reader, scalar_reader
 from composer.runtime.messages.arrays import array_reader
+from composer.runtime.messages.ownership import ownership_of
 
 # The types of most bare values, quickly distinguished from messages and mappings.
 _SCALARS: Final = frozenset({str, int, float, bool})
@@ -55,16 +57,22 @@ class PayloadConverter:
     """Converts payloads to messages of one class; get it from `converter_for`."""
 
     __slots__ = (
+        '_blank',
+        '_defaults',
         '_readers',
         '_rules',
         '_single',
+        '_slots',
         '_takes_bare_messages',
         'message_class',
         'type_name',
     )
 
-    def __init__(self, message_class: type) -> None:
+    def __init__(self, message_class: type, *, builds: bool = True) -> None:
         """Compile the converter of a message class, and those of its nested messages.
+
+        Args:
+            builds: Whether mappings become messages; otherwise they are only checked.
 
         Raises:
             InterfaceNotFoundError: The class of a nested message cannot be loaded.
@@ -73,12 +81,21 @@ class PayloadConverter:
         description = describe_class(message_class)
         self.message_class = message_class
         self.type_name = description.name
-        self._readers = {field.name: _reader_for(field.type) for field in description.fields}
+        self._readers = {
+            field.name: _reader_for(field.type, builds=builds) for field in description.fields
+        }
+        self._slots = {
+            field.name: (f'_{field.name}', _type_that_fits(field.type), self._readers[field.name])
+            for field in description.fields
+        }
         self._rules = tuple(
             (field.name, _type_that_fits(field.type), self._readers[field.name])
             for field in description.fields
         )
         first = description.fields[0] if len(description.fields) == 1 else None
+        ownership, nothing = ownership_of(message_class), SimpleNamespace()
+        self._blank: Callable[[], Any] = ownership.blank if builds else lambda: nothing
+        self._defaults = ownership.defaults if builds else ()
         self._single = first.name if first else None
         self._takes_bare_messages = first is not None and first.type.kind == 'message'
 
@@ -127,16 +144,23 @@ class PayloadConverter:
         return self._build({self._single: value})
 
     def _build(self, fields: Mapping[Any, object]) -> object:
-        message = self.message_class()
+        message, slots = self._blank(), self._slots
         for name, value in fields.items():
-            read = self._readers.get(name)
-            if read is None:
+            if name not in slots:
                 raise unknown_field(self.type_name, name, self._readers)
+            slot, fits, read = slots[name]
+            if type(value) is fits:
+                setattr(message, slot, value)
+                continue
             try:
-                setattr(message, name, read(value))
+                setattr(message, slot, read(value))
             except FieldError as error:
                 error.within(name)
                 raise
+        if len(fields) < len(self._defaults):
+            for name, slot, default, copy in self._defaults:
+                if name not in fields:
+                    setattr(message, slot, default if copy is None else copy(default))
         return message
 
     def _check(self, message: object) -> object:
@@ -155,14 +179,17 @@ class PayloadConverter:
 
 
 @cache
-def converter_for(message_class: type) -> PayloadConverter:
+def converter_for(message_class: type, *, builds: bool = True) -> PayloadConverter:
     """Return the converter of a message class; it is compiled once.
+
+    Args:
+        builds: See `PayloadConverter`.
 
     Raises:
         InterfaceNotFoundError: The class of a nested message cannot be loaded.
         UnsupportedFieldError: A field has a type that `.msg` files do not have.
     """
-    return PayloadConverter(message_class)
+    return PayloadConverter(message_class, builds=builds)
 
 
 def _type_that_fits(field_type: FieldType) -> type | None:
@@ -172,9 +199,9 @@ def _type_that_fits(field_type: FieldType) -> type | None:
     return {'float64': float, 'bool': bool}.get(field_type.kind)
 
 
-def _reader_for(field_type: FieldType) -> Reader:
+def _reader_for(field_type: FieldType, *, builds: bool) -> Reader:
     if field_type.nested is None:
         read_item = scalar_reader(field_type)
     else:
-        read_item = converter_for(import_interface(field_type.nested)).read
+        read_item = converter_for(import_interface(field_type.nested), builds=builds).read
     return read_item if field_type.array is None else array_reader(field_type, read_item)

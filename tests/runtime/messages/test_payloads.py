@@ -37,6 +37,10 @@ def received(message: Any) -> Any:
 def failure(message_class: type, payload: object) -> tuple[str, str | None]:
     with pytest.raises(PayloadError) as caught:
         convert(message_class, payload)
+    # Where nobody hears it, nothing is built, and the same errors are found.
+    with pytest.raises(PayloadError) as checked:
+        converter_for(message_class, builds=False).convert(payload)
+    assert (str(checked.value), checked.value.help) == (str(caught.value), caught.value.help)
     return str(caught.value), caught.value.help
 
 
