@@ -21,10 +21,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 # Threads, of which processes have one each, that a system of one node starts beside those of its
-# imports, of Composer and of Fast DDS; those of a worker, and what all workers need beside these.
+# imports, of Composer and of Fast DDS; those of a worker; and what keeps all workers, or all
+# external processes.
 SYSTEM_THREADS = 26
 WORKER_THREADS = 27
-KEEPER_THREADS = 6
+WORKER_KEEPER_THREADS = 6
+PROCESS_KEEPER_THREADS = 3
+# Those of commands that ask a system, or record its topics.
+CLIENT_THREADS = 11
 # Those of the process of cases, and of a case.
 CASE_THREADS = 14
 
@@ -80,7 +84,7 @@ def check_threads(count: int) -> None:
             thread.start()
             started += 1
     except RuntimeError as error:
-        message = f'the system needs {count} more threads, and only {started} can be started'
+        message = f'{count} more threads are needed, and only {started} can be started'
         raise StartError(message, help=THREADS_HELP) from error
     finally:
         is_over.set()

@@ -75,9 +75,12 @@ LACKS = {
 }
 
 
+COMMANDS = ('up system.yaml', 'up worker.yaml', 'test some.scenario.yaml', 'down')
+
+
 @pytest.mark.parametrize('call', LACKS)
 def test_a_kernel_that_lacks_a_call_is_refused_in_one_line(run, call):
-    for command in ('up system.yaml', 'up worker.yaml', 'test some.scenario.yaml', 'down'):
+    for command in COMMANDS:
         code, output = run(command, REFUSED + LACKS[call])
         assert code == 1
         message, advice = output.splitlines()
@@ -93,9 +96,7 @@ def test_a_python_that_lacks_a_call_is_refused_in_one_line(run):
     assert output.splitlines()[0].endswith(': this Python lacks it')
 
 
-@pytest.mark.parametrize(
-    'command', ['up system.yaml', 'up worker.yaml', 'test some.scenario.yaml']
-)
+@pytest.mark.parametrize('command', COMMANDS)
 def test_too_few_threads_are_refused_before_the_start(run, command):
     """Each stack takes a gigabyte, of eight that the process may have."""
     before = 'import threading\nthreading.stack_size(1 << 30)'
@@ -105,9 +106,7 @@ def test_too_few_threads_are_refused_before_the_start(run, command):
     )
     message, advice = output.splitlines()
     assert code == 1
-    assert re.fullmatch(
-        r'error: the system needs \d+ more threads, and only \d can be started', message
-    )
+    assert re.fullmatch(r'error: \d+ more threads are needed, and only \d can be started', message)
     assert '--pids-limit' in advice
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError, RosNotFoundError
 from composer.network.variables import PEERS, drop_unknown_peers
+from composer.processes.kernel import CLIENT_THREADS, check_threads
 from composer.records import record
 from composer.runtime.control import protocol
 from composer.runtime.environment import (
@@ -63,6 +64,7 @@ class Client:
 
     def __init__(self) -> None:
         check_ros()
+        check_threads(CLIENT_THREADS)
         if importlib.util.find_spec('std_srvs') is None:
             message = 'systems are asked by the services of std_srvs, which is not installed'
             raise RosNotFoundError(message)

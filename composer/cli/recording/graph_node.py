@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.errors import UsageError
+from composer.processes.kernel import CLIENT_THREADS, check_threads
 from composer.runtime.environment import check_middleware, check_ros, check_shell
 from composer.terminal import escape
 
@@ -44,6 +45,7 @@ def graph_node(name: str, ros_arguments: Sequence[str] = ()) -> Iterator[Node]:
         UsageError: The ROS arguments are wrong.
     """
     check_ros()
+    check_threads(CLIENT_THREADS)
     check_shell({})
     check_middleware(os.environ)
     from rclpy.context import Context

@@ -19,8 +19,9 @@ from composer.errors import ComposerError, ExitCode
 from composer.language.bindings import system_bindings
 from composer.network.transport_profile import shared_memory_variables
 from composer.processes.kernel import (
-    KEEPER_THREADS,
+    PROCESS_KEEPER_THREADS,
     SYSTEM_THREADS,
+    WORKER_KEEPER_THREADS,
     WORKER_THREADS,
     check_threads,
 )
@@ -149,9 +150,9 @@ class Workers:
             for each in wanted
             if each.name not in both or needs_new_process(both[each.name].spec, each)
         ]
-        own = 0 if self._is_bound else SYSTEM_THREADS
-        keepers = KEEPER_THREADS if wanted else 0
-        check_threads(own + keepers + WORKER_THREADS * len(wanted))
+        keepers = WORKER_KEEPER_THREADS if wanted else 0
+        threads = 0 if self._is_bound else SYSTEM_THREADS + _process_threads(spec)
+        check_threads(threads + keepers + WORKER_THREADS * len(wanted))
         for each in wanted:
             functions = self._calls.functions_for(each.name)
             worker = Worker(each, self._supervisor, functions, self._calls.list_clients)
@@ -385,6 +386,13 @@ class Workers:
     def kill_all(self) -> None:
         """Kill all at once; a signal handler may call it."""
         self._supervisor.kill_all()
+
+
+def _process_threads(spec: SystemSpec) -> int:
+    """Return how many threads the external processes need that start with a system."""
+    own = [each for each in spec.processes.values() if not each.external]
+    at_start = [each for each in own if not (each.on_demand or each.wait_for)]
+    return len(at_start) + PROCESS_KEEPER_THREADS if at_start else 0
 
 
 def no_workers() -> Workers:
