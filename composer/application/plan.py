@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer import confidential
 from composer.application.file_selection import load_given
 from composer.application.host_part import find_part, take_part
+from composer.application.running_systems.answer_forms import SNAPSHOT, read_answer
 from composer.checks.checker import check_in_context, create_context
 from composer.diagnostics import has_errors
-from composer.errors import UsageError
+from composer.errors import ComposerError, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.values.start_reader import StartValueReader
 from composer.network.variables import ros_variables
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import SystemSpec
     from composer.planning.plan import Plan
 
 _SNAPSHOT_SEC = 30.0
@@ -40,7 +43,8 @@ def plan(
 
     Args:
         paths: The file of the old system, and that of the new one; one file is that of the new
-            one, and the old one is the running system of its name.
+            one, and the old one is the running system of its name. It is read with the layers,
+            arguments and settings of that system where there are none here.
         words: Values for the arguments that both files declare.
         set_values: Values to change in both.
         layers: Files that change both.
@@ -57,14 +61,30 @@ def plan(
     if len(paths) > 2:  # noqa: PLR2004
         message = f'a plan compares two files, not {len(paths)}'
         raise UsageError(message, help='give layers with --layer')
+    running: str | ComposerError = ''
+    # Standard input cannot be read twice.
+    if len(paths) == 1 and str(paths[0]) != '-':
+        read_as = [paths[0], *layers]
+        try:
+            spec = load_given(read_as, words or None).spec
+        except UsageError:
+            # The running system may have more words; without any, there are samples.
+            spec = load_given(read_as).spec
+        running = _ask_running(spec, host) if spec else ''
+        if isinstance(running, str) and running:
+            given = read_answer(running, SNAPSHOT)['given']
+            names = {each.partition(':=')[0] for each in words}
+            kept = [each for each in given['words'] if each.partition(':=')[0] not in names]
+            words = [*kept, *words]
+            set_values = [*given['set_values'], *set_values]
+            layers = layers or [each for each in map(Path, given['layers']) if each.is_file()]
     contexts: list[CheckContext | None] = []
     findings: list[Diagnostic] = []
     hidden: dict[str, str] = {}
     for path in paths:
         is_new = path is paths[-1]
         before = next(filter(None, contexts), None)
-        given = [path, *layers], words, set_values
-        context, found = _read(*given, before, host, checks=is_new)
+        context, found = _read([path, *layers], words, set_values, before, host, checks=is_new)
         contexts.append(context)
         # Both may have one, as of a layer.
         findings += [each for each in found if each not in findings]
@@ -79,23 +99,29 @@ def plan(
     old, *more = read
     if more:
         return compare(take_snapshot(old), take_snapshot(more[0])), findings
-    return _compare_with_running(old), findings
+    running = running or _ask_running(old.spec, host)
+    if isinstance(running, ComposerError):
+        raise running
+    prefixes = decode_snapshot(read_answer(running)).prefixes
+    new = take_snapshot(old, [Path(each) for each in prefixes])
+    return compare(*conceal_both(running, new)), findings
 
 
-def _compare_with_running(context: CheckContext) -> Plan:
-    from composer.application.running_systems.answer_forms import read_answer
+def _ask_running(spec: SystemSpec, host: str) -> str | ComposerError:
+    """Return what the running system of a name answers, or why there is no answer."""
     from composer.application.running_systems.client import Client
     from composer.application.running_systems.discovery import Discovery
     from composer.runtime.control import protocol
     from composer.runtime.environment import environment_set
 
-    # They say on which graph it runs.
-    with environment_set(ros_variables(context.spec)), Client() as client:
-        system = Discovery(client).find(context.spec.running_name)
-        answer = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC)
-    prefixes = decode_snapshot(read_answer(answer.text)).prefixes
-    new = take_snapshot(context, [Path(each) for each in prefixes])
-    return compare(*conceal_both(answer.text, new))
+    name = replace(spec, host=host).running_name
+    try:
+        # The variables say on which graph it runs.
+        with environment_set(ros_variables(spec)), Client() as client:
+            system = Discovery(client).find(name)
+            return client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC).text
+    except ComposerError as error:
+        return error
 
 
 def _read(

@@ -81,6 +81,15 @@ class Reloader:
         self._told = ToldFindings(told)
         self._next_look = 0.0
 
+    @property
+    def given(self) -> dict[str, list[str]]:
+        """The layers, arguments and settings that the system was started with."""
+        return {
+            'layers': [str(self._folder / each) for each in self._reader.paths[1:]],
+            'words': [conceal(each) for each in self._reader.words],
+            'set_values': [conceal(each) for each in self._reader.set_values],
+        }
+
     def reload(self, system: System) -> Outcome:
         """Read the files, and rewire the system; after errors it is as it was.
 

@@ -20,6 +20,7 @@ _EXTERNAL: Final[Form] = {
     'restarts': int,
     **dict.fromkeys(('pid', 'cpu', 'memory_bytes'), _FIGURE),
 }
+SNAPSHOT: Final[Form] = {'given': {key: [str] for key in ('layers', 'words', 'set_values')}}
 STATUS: Final[Form] = {
     **dict.fromkeys(('name', 'file', 'host', 'state', 'last_error'), str),
     'pid': int,

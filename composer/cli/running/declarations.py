@@ -147,7 +147,7 @@ def reload_command(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool
 @click.argument('node')
 @_timeout
 def restart_command(node: str, timeout_sec: float) -> int:
-    """Build NODE of a running system, or start a process of it, anew.
+    """Build a node, or start an external process, anew.
 
     Its entities, parameters and state are as at the start again. NODE is its full name, or what
     follows the last slash of it; or the name of an external process.

@@ -132,12 +132,12 @@ def top_answer(own: dict[str, Any] | None, workers: Mapping[str, dict[str, Any]]
     return _answer({**own, 'has_cpu': has_cpu, **merged})
 
 
-def snapshot_answer(snapshot: Snapshot) -> Outcome:
-    """Return what a system runs as."""
+def snapshot_answer(snapshot: Snapshot, given: Mapping[str, list[str]]) -> Outcome:
+    """Return what a system runs as, and the layers and arguments that it was given."""
     # Few ask, and workers start faster without it.
     from composer.planning.snapshot_data import encode_snapshot
 
-    return _answer(encode_snapshot(snapshot))
+    return _answer({**encode_snapshot(snapshot), 'given': given})
 
 
 def _answer(data: dict[str, Any]) -> Outcome:

@@ -74,6 +74,10 @@ class ControlledSystem(Protocol):
 class Commands(Protocol):
     """What is done with the files of a running system."""
 
+    @property
+    def given(self) -> dict[str, list[str]]:
+        """The layers, arguments and settings that it was started with."""
+
     def reload(self, system: Any) -> Outcome:
         """Read the files, and let the system become what they say."""
 
@@ -113,7 +117,7 @@ class ControlServices:
         services = (
             (protocol.STATUS, status, queries),
             (protocol.TOP, top, queries),
-            (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot), queries),
+            (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot, commands.given), queries),
             (protocol.DOWN, self._stop_system, queries),
             (protocol.PLAN, lambda: commands.plan(system), changes),
             (protocol.RELOAD, lambda: self._reload(commands.reload), changes),

@@ -103,6 +103,36 @@ def test_files_are_compared_with_the_running_system(compose, capsys, monkeypatch
     assert errors.startswith("error: there is no system 'system' on this ROS graph")
 
 
+@pytest.mark.ros
+def test_a_file_is_read_as_the_running_system_was(compose, capsys):
+    """Its arguments, without which it may not even be readable, its layers and its settings."""
+    text = """
+        version: 1
+        args: {robots: {type: integer}, rate: 1.0}
+        nodes:
+          more: {}
+          "robot_{{ i }}":
+            foreach: {i: "{{ range(robots) }}"}
+            timers: {tick: {rate: "{{ rate }}", behaviour: parts:tick}}
+    """
+    path = compose.write(text, 'def tick(node):\n    pass\n')
+    layer = compose.folder / 'site.yaml'
+    layer.write_text('nodes: {more: {parameters: {speed: 1.0}}}')
+    setting = 'nodes.more.parameters.speed=2.0'
+    child = compose.run(path.name, layer.name, 'robots:=1', '--set', setting)
+    child.wait_until_ready()
+
+    def plan(*words):
+        assert run(['plan', str(path), *words]) == 0
+        return capsys.readouterr().out
+
+    assert plan() == 'system: no difference\n'
+    assert plan('robots:=2').endswith('system: 1 to add\n')
+    assert plan('rate:=2.0').endswith('system: 1 to change\n')
+    assert plan('--set', 'nodes.more.parameters.speed=3.0').endswith('system: 1 to change\n')
+    assert child.stop() == 0
+
+
 SECRETS = """\
 version: 1
 environment: {TOKEN: s3cr3t-1, PIN: {file: pin.txt}}
