@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 _KINDS = {'topic': 'msg', 'service': 'srv', 'action': 'action'}
+_UNKNOWN = {
+    'topic': 'unknown-topic',
+    'service': 'unknown-service',
+    'action': 'unknown-action',
+}
 _NOUNS = {'topic': 'message', 'service': 'service', 'action': 'action'}
 
 
@@ -43,7 +48,7 @@ def explain_unknown(
         meant = f'{meant} Otherwise {advice}' if is_near else advice
     return context.at_value(
         path,
-        'unknown-topic',
+        _UNKNOWN[kind],
         f"the system has no {kind} '{name}'",
         help=meant,
     )

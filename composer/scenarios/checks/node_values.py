@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_problem
+from composer.scenarios.checks.scenario_context import suggest_full_name
 from composer.scenarios.checks.time_checks import value_at
 from composer.scenarios.parsing.full_names import NameReader
 from composer.spelling import suggest
@@ -30,7 +31,12 @@ def explain_node(
 ) -> Diagnostic:
     """Return the finding for a node that the system does not have."""
     message = f"there is no node '{name}' in this system"
-    help_text = suggest(name.rpartition('/')[2], context.system.spec.nodes, 'its nodes are')
+    nodes, listed = context.system.spec.nodes, 'its nodes are'
+    if '/' in name:
+        full_names = [node.full_name for node in nodes.values()]
+        help_text = suggest_full_name(name, full_names, listed)
+    else:
+        help_text = suggest(name, nodes, listed)
     at = context.at_key if at_key else context.at_value
     return at(path, 'unknown-node', message, help=help_text)
 

@@ -10,6 +10,7 @@ from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Unpack
 
     from composer.checks.context import CheckContext
@@ -79,11 +80,7 @@ class ScenarioContext:
     def suggest_channel(self, kind: ChannelKind, name: str) -> str | None:
         """Return the help for a name that the system does not have."""
         names = [channel.name for channel in self.system.topology.of_kind(kind)]
-        near = find_nearest(name, names)
-        if near is None:
-            last = {each.rpartition('/')[2]: each for each in names}
-            near = last.get(find_nearest(name.rpartition('/')[2], last) or '')
-        return did_you_mean(near) or suggest(name, names, f'its {kind}s are')
+        return suggest_full_name(name, names, f'its {kind}s are')
 
     def at_value(
         self,
@@ -103,3 +100,16 @@ class ScenarioContext:
     ) -> Diagnostic:
         """Return a finding at a key."""
         return diagnostic_at(self.loaded.positions.key(path), rule, message, **remarks)
+
+
+def suggest_full_name(name: str, names: Sequence[str], listed: str) -> str | None:
+    """Return the help for a wrong full name: the namespace may be wrong, or what follows it.
+
+    Args:
+        listed: See `suggest`.
+    """
+    near = find_nearest(name, names)
+    if near is None:
+        last = {each.rpartition('/')[2]: each for each in names}
+        near = last.get(find_nearest(name.rpartition('/')[2], last) or '')
+    return did_you_mean(near) or suggest(name, names, listed)

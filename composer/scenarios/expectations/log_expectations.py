@@ -12,7 +12,7 @@ from composer.scenarios.specs import ErrorExpectationSpec, ExitExpectationSpec
 from composer.simulation.trace import error_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from composer.scenarios.expectations.happenings import Happenings
     from composer.scenarios.specs import CaseSpec, LogExpectationSpec
@@ -25,6 +25,7 @@ START = 'start'
 _LEVELS['warning'] = _LEVELS['warn']
 # Of a longer traceback, the last lines are shown.
 _MOST_LINES = 24
+_MOST_OTHERS = 8
 
 
 def check_log(expected: LogExpectationSpec, happened: Happenings) -> Iterator[Failure]:
@@ -36,14 +37,14 @@ def check_log(expected: LogExpectationSpec, happened: Happenings) -> Iterator[Fa
         if _LEVELS.get(each.name, 0) >= lowest and _is_meant(expected, each)
     ]
     what = 'line' if expected.level is None else f'{expected.level} line'
-    yield from _check_count(expected, found, what, happened)
+    yield from _check_count(expected, found, what, happened, 'log')
 
 
 def check_error(expected: ErrorExpectationSpec, happened: Happenings) -> Iterator[Failure]:
     """Check how many errors behaviours raise."""
     errors = happened.of_kind('error', expected.window)
     found = [each for each in errors if _is_meant(expected, each)]
-    yield from _check_count(expected, found, 'error', happened)
+    yield from _check_count(expected, found, 'error', happened, 'error')
 
 
 def _is_meant(expected: LogExpectationSpec | ErrorExpectationSpec, event: Event) -> bool:
@@ -60,6 +61,7 @@ def _check_count(
     found: list[Event],
     noun: str,
     happened: Happenings,
+    kind: str,
 ) -> Iterator[Failure]:
     if expected.least <= len(found) and (expected.most is None or len(found) <= expected.most):
         return
@@ -67,14 +69,37 @@ def _check_count(
     message = f'expected {wanted} of {expected.node or "any node"}'
     message += f' with {show_value(expected.text)}' if expected.text is not None else ''
     message += f' that matches {show_value(expected.regex)}' if expected.regex is not None else ''
-    message += f'{in_window(expected.window)}, got {count_of(len(found), noun)}'
+    others = [] if found else _find_others(expected, happened.of_kind(kind))
+    listed = count_of(len(others), 'error' if kind == 'error' else 'line')
+    got = f'none among {listed}' if others else count_of(len(found), noun)
+    message += f'{in_window(expected.window)}, got {got}'
     names = (expected.node,) if expected.node else ()
-    time, diff = expected.window.end_ns or happened.end_ns, ''
+    time, diff = expected.window.end_ns or happened.end_ns, _list(others)
     if len(found) > expected.least:
         culprit = found[min(expected.most or 0, len(found) - 1)]
         message += at_time(culprit.time_ns) if len(found) == 1 else ''
         time, diff = culprit.time_ns, f'+ {_in_one_line(culprit)}'
     yield Failure(expected.path, message, diff, time, names)
+
+
+def _find_others(
+    expected: LogExpectationSpec | ErrorExpectationSpec, events: Iterable[Event]
+) -> list[Event]:
+    """Return what there is instead: of the node, or if it has none, of all; at any time."""
+    every = list(events)
+    return [each for each in every if expected.node in (None, each.node)] or every
+
+
+def _list(events: Sequence[Event]) -> str:
+    """Return the first of each text, a line each, as many as are shown."""
+    first: dict[str, Event] = {}
+    for event in events:
+        level = f'{event.name}: ' if event.kind == 'log' else ''
+        owner = f'{event.node}: ' if event.node else ''
+        first.setdefault(f'+ {owner}{level}{_in_one_line(event)}', event)
+    lines = [f'{text}{at_time(event.time_ns)}' for text, event in first.items()]
+    more = len(lines) - _MOST_OTHERS
+    return '\n'.join([*lines[:_MOST_OTHERS], *[f'  … and {more} more'] * (more > 0)])
 
 
 def check_unexpected_errors(case: CaseSpec, happened: Happenings) -> Iterator[Failure]:

@@ -42,6 +42,22 @@ class Difference:
     is_note: bool = False
 
 
+def find_distance(differences: Sequence[Difference]) -> tuple[float, int]:
+    """Return what is least for the nearest values: how far all are off, then how many are.
+
+    A number counts as less than 1, the more the farther it is off; anything else counts as 1.
+    """
+    return sum(map(_distance, differences)), len(differences)
+
+
+def _distance(difference: Difference) -> float:
+    expected, actual = difference.expected, difference.actual
+    if not (_is_number(expected) and _is_number(actual)):
+        return 1.0
+    off = abs(actual - expected) / max(1.0, abs(expected))
+    return off / (1.0 + off) if math.isfinite(off) else 1.0
+
+
 @record
 class Comparison:
     """How values are compared.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.scenarios.expectations.diffs import render_differences, show_value
 from composer.scenarios.expectations.failures import Failure
-from composer.scenarios.expectations.matching import Comparison
+from composer.scenarios.expectations.matching import Comparison, find_distance
 from composer.scenarios.expectations.wording import at_time, count_of
 from composer.scenarios.specs import (
     CallStepSpec,
@@ -93,7 +93,7 @@ def _check_feedback(step: GoalStepSpec, outcome: Outcome) -> Iterator[Failure]:
             f'{at_time(outcome.time_ns)}, got none such among '
             f'{count_of(len(rest), "message")}{" after those before" if index else ""}'
         )
-        nearest = min(compared, key=len, default=[])
+        nearest = min(compared, key=find_distance, default=[])
         path: DataPath = (*step.path, 'feedback', index)
         diff = render_differences(nearest)
         yield Failure(path, message, diff, _end_of(outcome), (step.action,))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.scenarios.expectations.diffs import render_differences, show_value
 from composer.scenarios.expectations.failures import Failure
-from composer.scenarios.expectations.matching import Comparison
+from composer.scenarios.expectations.matching import Comparison, find_distance
 from composer.scenarios.expectations.message_conditions import ConditionError, condition_of
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
 from composer.scenarios.specs import WindowSpec
@@ -182,14 +182,14 @@ def _find_outside(
 def _find_nearest(
     pattern: PatternSpec, messages: list[PublishedMessage]
 ) -> tuple[PublishedMessage, list[Difference]] | None:
-    """Return the message with the fewest differences, or the last one if only `where` counts."""
+    """Return the message with the nearest values, or the last one if only `where` counts."""
     if pattern.message is None:
         return (messages[-1], []) if messages else None
     recent = messages[-_MOST_COMPARED:]
     held = [each for each in recent if _holds(pattern, each)] or recent
     compare = Comparison(pattern.tolerance).find_differences
     compared = [(each, list(compare(pattern.message, each.message))) for each in held]
-    return min(compared, key=lambda pair: len(pair[1]), default=None)
+    return min(compared, key=lambda pair: find_distance(pair[1]), default=None)
 
 
 def _matching(

@@ -62,15 +62,15 @@ WRONG = [
      'std_srvs/srv/Empty bad-value: expected a message type, as in package/msg/Name; got '
      "'std_srvs/srv/Empty'", 'no-subscription'),
     ({'when': '{call: /rest}'},
-     "/rest unknown-topic: the system has no service '/rest' (did you mean '/reset'?)"),
+     "/rest unknown-service: the system has no service '/rest' (did you mean '/reset'?)"),
     ({'when': '{call: /dock}'}, "/dock no-server: no node of this system serves '/dock' "
      "(give it a stand-in, under 'given: {services: …}')"),
     ({'when': '{send_goal: /coutn}'},
-     "/coutn unknown-topic: the system has no action '/coutn' (did you mean '/count'?)"),
+     "/coutn unknown-action: the system has no action '/coutn' (did you mean '/count'?)"),
     ({'given': '{services: {/reset: {}}}'}, "/reset second-server: '/reset' is served by node "
      "'robot': a stand-in would be a second server (remove the stand-in)"),
     ({'given': '{services: {/dokc: {}}}'},
-     "/dokc unknown-topic: the system has no service '/dokc' (did you mean '/dock'?)"),
+     "/dokc unknown-service: the system has no service '/dokc' (did you mean '/dock'?)"),
     ({'then': '{topic: /sped}'},
      "/sped unknown-topic: the system has no topic '/sped' (did you mean '/speed'? "
      "Otherwise write its 'type' if a library publishes it with node.ros)"),
@@ -128,7 +128,7 @@ WRONG = [
      "fats refused-parameter: parameter 'mode': 'fats' is not one of its choices: fast, slow "
      "(did you mean 'fast'?)"),
     ({'then': '{parameters: {/robot: {limit: 1}}}'},
-     "/robot unknown-node: there is no node '/robot' in this system (did you mean 'robot'?)"),
+     "/robot unknown-node: there is no node '/robot' in this system (did you mean '/lab/robot'?)"),
     ({'then': '{state: {robot: active}}'},
      "robot no-lifecycle: node 'robot' has no lifecycle, and no state"),
     ({'then': '{log: robt}'},

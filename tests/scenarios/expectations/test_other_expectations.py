@@ -31,7 +31,8 @@ LOG = [
         ),
         (
             {'log': 'n', 'text': 'gone', 'within': [0, 5]},
-            [('expected a line of /n with "gone" from 0 s to 5 s, got no line', '')],
+            [('expected a line of /n with "gone" from 0 s to 5 s, got none among 2 lines',
+              '+ /n: info: ready at 1 s\n+ /n: warn: battery at 3 % at 2 s')],
         ),
         (
             {'log': '*', 'matches': 'a', 'count': 1},
@@ -40,7 +41,8 @@ LOG = [
         ),
         (
             {'log': '/n', 'level': 'error'},
-            [('expected an error line of /n, got no error line', '')],
+            [('expected an error line of /n, got none among 2 lines',
+              '+ /n: info: ready at 1 s\n+ /n: warn: battery at 3 % at 2 s')],
         ),
         ({'error': '*', 'text': 'too far', 'count': 2},
          [('expected 2 errors of any node with "too far", got 1 error', '')]),

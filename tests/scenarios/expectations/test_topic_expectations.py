@@ -87,8 +87,8 @@ def test_what_holds_says_nothing(said, then):
         (
             {'topic': '/scan', 'message': {'frame': 'laser', 'origin': {'x': 3, 'y': 0}}},
             'expected a message on /scan with {frame: "laser", origin: {x: 3, y: 0}}, got none '
-            'among 2 messages; the nearest is that at 1 s',
-            ['  origin:', '-   x: 3', '+   x: 1.0'],
+            'among 2 messages; the nearest is that at 2 s',
+            ['  origin:', '-   x: 3', '+   x: 2.0'],
         ),
         (
             {'topic': '/ramp', 'rate': [9.5, 10.5], 'between': [0, 5]},

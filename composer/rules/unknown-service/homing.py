@@ -1,0 +1,2 @@
+def reset(node, request):
+    return {'success': True}
