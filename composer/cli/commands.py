@@ -23,6 +23,14 @@ from composer.errors import ExitCode
 
 # Required: without a command, there is only help.
 _SUBCOMMAND = 'COMMAND [ARGS]...'
+# What ros2 and other tools call them.
+_OTHER_COMMANDS = {
+    **dict.fromkeys(('launch', 'run', 'start'), 'up'),
+    **dict.fromkeys(('kill', 'stop'), 'down'),
+    **dict.fromkeys(('lint', 'validate'), 'check'),
+    'init': 'new',
+    'play': 'replay',
+}
 
 
 def _show_version(context: click.Context, _option: click.Parameter, value: object) -> None:
@@ -33,6 +41,19 @@ def _show_version(context: click.Context, _option: click.Parameter, value: objec
         context.exit()
 
 
+class _Commands(click.Group):
+    """The commands; those of other tools are reported with the one that does the same."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        meant = _OTHER_COMMANDS.get(args[0])
+        if meant is not None:
+            message = f"no such command '{args[0]}'. Did you mean '{meant}'?"
+            ctx.fail(message)
+        return super().resolve_command(ctx, args)
+
+
 def _help_without_command(context: click.Context) -> int:
     """Print the help if no command was given."""
     if context.invoked_subcommand is None:
@@ -41,6 +62,7 @@ def _help_without_command(context: click.Context) -> int:
 
 
 @click.group(
+    cls=_Commands,
     invoke_without_command=True,
     subcommand_metavar=_SUBCOMMAND,
     context_settings={'help_option_names': ['-h', '--help']},

@@ -253,6 +253,9 @@ def _assign_words(
         name, separator, text = word.partition(_SEPARATOR)
         if separator:
             yield name, text
+        elif (given := word.partition('='))[0] in declared:
+            problems.append(f"write '{given[0]}:={given[2]}', not '{word}'")
+            yield given[0], given[2]
         elif (position := next(positions, None)) is not None:
             yield position, word
         else:

@@ -26,7 +26,7 @@ from composer.language.parsing.system_parser import parse_specs
 from composer.language.paths import resolve_paths
 from composer.language.set_option import apply_set_values
 from composer.schema.structure import check_structure
-from composer.yaml_text.reader import parse_document, read_document
+from composer.yaml_text.reader import parse_document, read_document, refuse_launch_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -148,6 +148,10 @@ def _load(
 
 def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
     """Take a file, included or not, through the steps that concern it alone."""
+    if 'version' not in system.entries and isinstance(system.entries.get('launch'), list):
+        system.data = None
+        system.diagnostics = [refuse_launch_file(system.positions.source.name)]
+        return
     give_arguments(system, give_values)
     evaluate_expressions(system)
     if system.data is None:

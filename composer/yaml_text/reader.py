@@ -22,6 +22,9 @@ from composer.yaml_text.tree import CompositionError, compose_tree
 if TYPE_CHECKING:
     from pathlib import Path
 
+# Of a launch file in Python or XML; in YAML, these begin no line.
+_LAUNCH_CODE = ('def generate_launch_description(', '<launch>', '<launch ')
+
 
 def read_document(path: Path, name: str | None = None) -> Document:
     """Read a file.
@@ -69,6 +72,8 @@ def parse_document(content: bytes, name: str) -> Document:
     text = decode_content(content, name)
     if isinstance(text, Diagnostic):
         return _without_data(text)
+    if any(f'\n{code}' in f'\n{text}' for code in _LAUNCH_CODE):
+        return _without_data(refuse_launch_file(name))
     positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
     try:
         tree = compose_tree(text, positions.source)
@@ -89,6 +94,14 @@ def parse_document(content: bytes, name: str) -> Document:
         help="begin with 'version: 1'",
     )
     return Document(None, positions, [*findings, top])
+
+
+def refuse_launch_file(name: str) -> Diagnostic:
+    """Return the finding for a launch file that is given as a system."""
+    message = 'this is a launch file, and no system'
+    return Diagnostic(
+        'wrong-type', message, name, help=f"'composer import {name}' turns it into a system"
+    )
 
 
 def _unreadable(name: str, message: str, help: str | None = None) -> Diagnostic:  # noqa: A002

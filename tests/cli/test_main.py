@@ -336,3 +336,51 @@ print(code, *({'asyncio', 'jinja2', 'jsonschema', 'rclpy', 'statistics'} & {*sys
 """
     done = start([sys.executable, '-c', script])
     assert (done.stdout, done.stderr) == ('0\n', '')
+
+
+# What somebody who comes from other tools writes
+
+
+PYTHON = 'def generate_launch_description():\n    return LaunchDescription([])\n'
+HABITS = [
+    *((f'{word} FILE', "Did you mean 'up'?") for word in ('launch', 'run', 'start')),
+    ('stop FILE', "Did you mean 'down'?"),
+    ('import FILE --force', "no such option '--force'"),
+    ('import x.launch.py sim=true', 'help: write sim:=true'),
+    ('up FILE sim=true', "write 'sim:=true'"),
+    ('up FILE --sim true', "help: write 'sim:=true'"),
+    ('up FILE --sim=true', "help: write 'sim:=true'"),
+    ('check FILE --sim', "help: write 'sim:=VALUE'"),
+    *((f'up r.launch.{end}', f"help: 'composer import r.launch.{end}'")
+      for end in ('py', 'xml', 'yaml')),
+    ('check includes.yaml', "help: 'composer import r.launch.yaml'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(('words', 'said'), HABITS, ids=[words for words, _ in HABITS])
+def test_what_other_tools_take_is_an_error_with_what_to_write(
+    run, tmp_path, monkeypatch, words, said
+):
+    monkeypatch.chdir(tmp_path)
+    for name, text in {
+        'r.launch.py': PYTHON,
+        'r.launch.xml': '<?xml version="1.0"?>\n<launch><arg name="a" default="1"/></launch>\n',
+        'r.launch.yaml': 'launch:\n- node: {pkg: demo, exec: talker}\n',
+        'includes.yaml': 'version: 1\ninclude: {r: {file: r.launch.yaml}}\n',
+        'FILE': 'version: 1\nargs: {sim: false}\nnodes: {}\n',
+    }.items():
+        Path(name).write_text(text)
+    code, out, err = run(*words.split())
+    assert code in (1, 2)
+    assert said in out + err
+
+
+def test_o_is_output_in_every_command():
+    options = {
+        name: option.opts
+        for name, command in cli.cli.commands.items()
+        for option in command.params
+        if '--output' in option.opts
+    }
+    assert len(options) > 5
+    assert {name for name, opts in options.items() if '-o' not in opts} == set()

@@ -39,6 +39,7 @@ _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 @takes_format(list(FORMATS), 'The format of the report.')
 @click.option(
     '--output',
+    '-o',
     type=click.Path(path_type=Path, dir_okay=False),
     help='Write the report to this file, and print the findings as text.',
 )

@@ -99,12 +99,27 @@ def refuse_options(words: Sequence[str]) -> None:
         click.UsageError: There is none, or an unknown option.
     """
     context = click.get_current_context()
-    for word in words:
+    for index, word in enumerate(words):
         if _OPTION.match(word):
+            _refuse_argument(words, index)
             raise click.NoSuchOption(word, possibilities=_find_near(word, context), ctx=context)
     if not words:
         message = "Missing argument 'FILE'."
         raise click.UsageError(message, context)
+
+
+def _refuse_argument(words: Sequence[str], index: int) -> None:
+    """Check that an unknown option is no argument that the file declares."""
+    from pathlib import Path
+
+    from composer.language.arguments import parse_declarations
+    from composer.yaml_text.reader import read_document
+
+    name, is_given, value = words[index].lstrip('-').partition('=')
+    if index and name in parse_declarations(read_document(Path(words[0])).data or {}):
+        value = value if is_given else ''.join(words[index + 1 : index + 2]) or 'VALUE'
+        message = f"no such option '{words[index]}': '{name}' is an argument of the file"
+        raise UsageError(message, help=f"write '{name}:={value}'")
 
 
 def refuse_together(given: Mapping[str, bool]) -> None:

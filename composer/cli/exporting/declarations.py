@@ -16,6 +16,7 @@ from composer.export import FORMS
 @takes_system
 @click.option(
     '--output',
+    '-o',
     type=click.Path(path_type=Path, file_okay=False),
     metavar='DIR',
     help='Write the files to this folder. Default: print them.',

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from composer.cli.common.argument_types import NUMBERS_ARE_VALUES
+from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, refuse_options
 
 
 @click.command('import', context_settings=NUMBERS_ARE_VALUES)
@@ -37,4 +37,5 @@ def import_command(
     """
     from composer.cli.importing.import_launch import import_launch_file
 
+    refuse_options((str(file), *words))
     return import_launch_file(file, words, output, verifies=verifies)

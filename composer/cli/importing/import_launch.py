@@ -104,8 +104,9 @@ def _read_words(words: Sequence[str]) -> dict[str, str]:
     for word in words:
         name, separator, value = word.partition(':=')
         if not separator or not name:
+            meant = word.replace('=', ':=', 1) if '=' in word else 'NAME:=VALUE'
             message = f"'{word}' is no argument of a launch file"
-            raise UsageError(message, help='write NAME:=VALUE')
+            raise UsageError(message, help=f'write {meant}')
         given[name] = value
     return given
 

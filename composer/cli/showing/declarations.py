@@ -73,6 +73,7 @@ def show_command(
 )
 @click.option(
     '--output',
+    '-o',
     type=click.Path(path_type=Path, dir_okay=False),
     help='Write the drawing to this file.',
 )
@@ -110,6 +111,7 @@ def schema_command(*, path_only: bool, matrix: bool, scenarios: bool) -> int:
 @takes_system
 @click.option(
     '--output',
+    '-o',
     type=click.Path(path_type=Path, file_okay=False),
     default=Path('typings'),
     show_default=True,
