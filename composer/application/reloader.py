@@ -135,6 +135,7 @@ class Reloader:
         text = _NO_CHANGE if was_good else _GOOD_AGAIN
         if plan:
             text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}'
+            text += plan.describe_rebuilt()
         if system.starts_again:
             text = f'{STARTS_AGAIN}: {plan.summarize()}'
         if plan or not was_good:

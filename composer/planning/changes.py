@@ -118,7 +118,7 @@ def _compare_behaviours(old: Reading, new: Reading, name: str) -> Iterator[Chang
         return
     if before.name != after.name:
         yield _change(old, new, name, before.name, after.name)
-    elif old.snapshot.code.get(before.module) != new.snapshot.code.get(after.module):
+    elif old.snapshot.code_of(before) != new.snapshot.code_of(after):
         yield _change(old, new, name, before.name, after.name, is_code=True)
     key = 'with' if name == 'behaviour' else f'{name}.with'
     yield from compare_entries(old, new, key, before.arguments, after.arguments)

@@ -385,7 +385,11 @@ class _Comparison:
         """Yield the classes of behaviours that have other code now."""
         before, after = map(_find_classes, (old, new))
         for name in before.keys() & after.keys():
-            if before[name].behaviour.module in self._stale:
+            codes = [
+                side.snapshot.code_of(bindings[name].behaviour)
+                for side, bindings in ((old, before), (new, after))
+            ]
+            if codes[0] != codes[1]:
                 yield Change(
                     'class',
                     name,

@@ -28,6 +28,8 @@ class Action(Enum):
 # After these there is no more of what was there, and after those there is something new.
 GOING = (Action.RECREATE, Action.REMOVE)
 COMING = (Action.RECREATE, Action.ADD)
+_MOST_REBUILT = 8
+_NAMED = ('nodes', 'components', 'processes', 'workers')
 
 
 @record
@@ -100,6 +102,22 @@ class Plan:
             f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
             for (action, noun), count in counts.items()
         )
+
+    def describe_rebuilt(self) -> str:
+        """Return `; rebuilt: node 'arm' (lost: its state)`; entities are only counted."""
+        rebuilt = [
+            each
+            for each in self.operations
+            if each.action is Action.RECREATE and each.target[1] in _NAMED
+        ]
+        texts = [
+            f"{each.noun} '{each.name}'"
+            + (f' (lost: {", ".join(each.lost)})' if each.lost else '')
+            for each in rebuilt[:_MOST_REBUILT]
+        ]
+        more = len(rebuilt) - len(texts)
+        texts += [f'and {more} more'] * (more > 0)
+        return f'; rebuilt: {", ".join(texts)}' if texts else ''
 
     def counts(self) -> dict[Action, int]:
         """Return how many operations there are of each kind, in the order of `Action`."""

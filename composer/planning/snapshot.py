@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from composer.diagnostics import Span
-    from composer.language.specs import SystemSpec
+    from composer.language.specs import BehaviourSpec, SystemSpec
     from composer.ros_parameters.file_reader import ParameterEntry
     from composer.yaml_text.positions import DataPath, SourceMap
 
@@ -23,6 +23,7 @@ class Snapshot:
         code: For each module that a behaviour is in, and each of the project that such a one
             imports, the digest of its source and of all that it imports itself, by its name.
         sources: The texts of these modules.
+        classes: The digest of each class of behaviours, with all that it uses, by `module:Class`.
         definitions: The text of each definition file of the declared interface packages, by the
             package and the path in its folder.
         overrides: What the parameter files of nodes say of their parameters, by the nodes' full
@@ -46,10 +47,17 @@ class Snapshot:
     set_live: Mapping[str, Collection[str]] | None = None
     read_at_start: Collection[Span] = frozenset()
     hidden: Mapping[str, str] = field(default_factory=dict)
+    classes: Mapping[str, str] = field(default_factory=dict)
 
     def is_read_at_start(self, path: DataPath) -> bool:
         """Return whether the value at a path is read when the system starts."""
         return bool(self.read_at_start) and self.positions.value(path) in self.read_at_start
+
+    def code_of(self, behaviour: BehaviourSpec) -> str | None:
+        """Return the digest of the code of a behaviour: of its module, or of its class."""
+        if behaviour.class_name:
+            return self.classes.get(f'{behaviour.module}:{behaviour.class_name}')
+        return self.code.get(behaviour.module)
 
     def stale_modules(self, other: Snapshot) -> set[str]:
         """Return the modules whose source, or what they import, differs from `other`'s."""

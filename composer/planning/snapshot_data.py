@@ -100,6 +100,7 @@ def encode_snapshot(
         'keys': places(snapshot.positions.keys),
         'values': places(snapshot.positions.values),
         'code': dict(snapshot.code),
+        'classes': dict(snapshot.classes),
         'prefixes': list(snapshot.prefixes),
         'generators': sorted(snapshot.generators),
         'set_live': {node: sorted(names) for node, names in (snapshot.set_live or {}).items()},
@@ -160,6 +161,7 @@ def _decode_snapshot(data: Mapping[str, Any]) -> Snapshot:
         tuple(data['prefixes']),
         frozenset(data['generators']),
         dict(data['set_live']),
+        classes=dict(data['classes']),
     )
 
 

@@ -10,6 +10,7 @@ from composer.confidential import hidden_values
 from composer.interfaces.search_paths import extend_processes
 from composer.language.bindings import system_bindings
 from composer.language.parameter_files import read_given_file
+from composer.planning.class_code import find_class_code
 from composer.planning.snapshot import Snapshot
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
@@ -34,7 +35,8 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
     spec = extend_processes(context.spec, prefixes)
     sources = _Sources(context.modules)
     nodes = [*spec.nodes.values()]
-    modules = {each.behaviour.module for each in system_bindings(spec)}
+    behaviours = [each.behaviour for each in system_bindings(spec)]
+    modules = {each.module for each in behaviours}
     definitions = {
         (package.package, name): text
         for package in context.interfaces.definitions or ()
@@ -53,6 +55,11 @@ def take_snapshot(context: CheckContext, prefixes: Sequence[Path] = ()) -> Snaps
         frozenset(_find_generators(context)),
         read_at_start=frozenset(each.span for each in context.system.start.found),
         hidden=hidden_values(),
+        classes={
+            f'{each.module}:{each.class_name}': sources.class_digest(each.module, each.class_name)
+            for each in behaviours
+            if each.class_name
+        },
     )
 
 
@@ -93,6 +100,26 @@ class _Sources:
             digest.update(f'{each}\0{self.text(each)}\0'.encode(errors='surrogatepass'))
         return digest.hexdigest()
 
+    def class_digest(self, name: str, class_name: str) -> str:
+        """Return the digest of a class and of what it uses; that of its module if in doubt."""
+        module = self._finder.find(name)
+        code = find_class_code(self.text(name), class_name)
+        if code is None or isinstance(module, MissingModule):
+            return self.digest(name)
+        digest = hashlib.sha256()
+        for statement in code:
+            digest.update(f'{ast.dump(statement)}\0'.encode(errors='surrogatepass'))
+        imports = [
+            each
+            for statement in code
+            for each in ast.walk(statement)
+            if isinstance(each, ast.Import | ast.ImportFrom)
+        ]
+        for each in dict.fromkeys(_names_imported(name, module, imports)):
+            if each != name and self._is_reloaded(each) and self._finder.has(each):
+                digest.update(f'{each}\0{self.digest(each)}\0'.encode())
+        return digest.hexdigest()
+
     def text(self, name: str) -> str:
         """Return the source of a module."""
         module = self._finder.find(name)
@@ -107,7 +134,11 @@ class _Sources:
     def _imports(self, name: str) -> tuple[str, ...]:
         if name not in self._imported:
             module = self._finder.find(name)
-            read = () if isinstance(module, MissingModule) else _names_imported(name, module)
+            read = (
+                ()
+                if isinstance(module, MissingModule)
+                else _names_imported(name, module, module.import_statements)
+            )
             self._imported[name] = tuple(
                 each
                 for each in dict.fromkeys(read)
@@ -120,12 +151,14 @@ class _Sources:
         return name.partition('.')[0] != 'composer' and self._finder.is_of_project(name)
 
 
-def _names_imported(name: str, module: ModuleSource) -> Iterator[str]:
-    """Yield what a module may import, anywhere in it; of `from a import b` both `a` and `a.b`."""
+def _names_imported(
+    name: str, module: ModuleSource, statements: Iterable[ast.Import | ast.ImportFrom]
+) -> Iterator[str]:
+    """Yield what statements of a module import; of `from a import b` both `a` and `a.b`."""
     is_package = module.path is not None and module.path.name == '__init__.py'
     package = name.split('.') if is_package else name.split('.')[:-1]
     yield from ('.'.join(package[:depth]) for depth in range(1, len(package) + 1))
-    for node in module.import_statements:
+    for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
             continue

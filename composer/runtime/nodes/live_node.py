@@ -87,6 +87,7 @@ class LiveNode:
         parameters: Its declared parameters, once its entities are created.
         lifecycle: Its lifecycle; `None` for a node without.
         remote_parameters: Gets and sets those of other nodes.
+        owners: The classes of its instances, by `module:Class`.
     """
 
     spec: NodeSpec
@@ -115,6 +116,7 @@ class LiveNode:
     lifecycle: NodeLifecycle | None = None
     _groups: dict[str, CallbackGroup] = field(default_factory=dict)
     _views: dict[Owner, Node] = field(default_factory=dict)
+    owners: dict[str, type] = field(default_factory=dict)
     _instances: dict[type, Any] = field(default_factory=dict)
     _is_destroyed: bool = False
 
@@ -150,7 +152,9 @@ class LiveNode:
             node = self._views.setdefault(owner, node.with_own_state())
         function = self.function_of(behaviour)
         if isinstance(function, Method):
-            function = function.of(self._instance(function.owner))
+            # An edit beside the class made a new one, too: the node keeps that of its instance.
+            kept = self.owners.setdefault(class_of(behaviour), function.owner)
+            function = function.of(self._instance(kept))
         return partial(function, node, **behaviour.arguments)
 
     def function_of(self, behaviour: BehaviourSpec) -> Callable[..., Any]:
@@ -171,7 +175,8 @@ class LiveNode:
         for binding in node_bindings(self.spec):
             method = self.functions[binding.behaviour.name]
             if isinstance(method, Method):
-                self._instance(method.owner)
+                owner = self.owners.setdefault(class_of(binding.behaviour), method.owner)
+                self._instance(owner)
 
     def _instance(self, owner: type) -> Any:
         """Return the node's instance of a class; it is made with the first that needs it."""
@@ -476,3 +481,8 @@ def create_live_node(spec: NodeSpec, system: SystemHandle) -> LiveNode:
 
         ros.add_post_set_parameters_callback(tell)
     return live
+
+
+def class_of(behaviour: BehaviourSpec) -> str:
+    """Return `module:Class` of a behaviour that is a method."""
+    return f'{behaviour.module}:{behaviour.class_name}'

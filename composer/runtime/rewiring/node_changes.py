@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 from rclpy.parameter import Parameter
 
 from composer.errors import StartError
+from composer.language.bindings import node_bindings
 from composer.planning.plan import COMING, Action
 from composer.runtime.entities.creators import create_entity
 from composer.runtime.entities.parameters import PARAMETER_HOOKS
 from composer.runtime.entities.subscriptions import Subscription
 from composer.runtime.logs import set_level
+from composer.runtime.nodes.live_node import class_of
 from composer.runtime.rewiring.parameter_changes import ParameterChange
 
 if TYPE_CHECKING:
@@ -71,10 +73,12 @@ class NodeChange:
             if key not in before.state and key not in state
         }
         state.update(come)
+        owners = node.owners
         self._follow(spec, self._new)
 
         def put_back() -> None:
             self._follow(before, self._old)
+            node.owners = owners
             for key in come:
                 state.pop(key, None)
             state.update(gone)
@@ -84,6 +88,8 @@ class NodeChange:
     def _follow(self, spec: NodeSpec, reading: Reading) -> None:
         node = self._node
         node.spec, node.functions = spec, reading.functions
+        classes = {class_of(each.behaviour) for each in node_bindings(spec)}
+        node.owners = {name: owner for name, owner in node.owners.items() if name in classes}
         entries = reading.snapshot.overrides.get(node.full_name, {})
         if entries or node.ros.from_files:
             node.ros.follow_files(entries)

@@ -82,3 +82,48 @@ def test_threads_and_times_change_in_place(compose, peer, wait_for):
     assert child.stop(signal.SIGINT) == 1
     assert child.matching("process 'deaf' did not end within 0.2 s of SIGINT, and is killed")
     assert child.matching("node 'hanging': subscription 'words' did not end in time")
+
+
+CLASS = """
+class Counter:
+    def __init__(self, node):
+        self.count = 0
+
+    def tick(self, node):
+        self.count += 1
+        node.logger.info(f'count {self.count}')
+
+    def show(self, node):
+        node.logger.info(f'shown {self.count > 3}')
+
+def other(node):
+    node.logger.info('other 1')
+"""
+
+
+def test_an_edit_beside_a_class_leaves_its_instance(compose):
+    """Also if the node changes later, and calls another method of the class."""
+    text = """
+        version: 1
+        nodes:
+          counter: {timers: {tick: {period: 0.05, behaviour: parts:Counter.tick}}}
+          other: {timers: {tick: {period: 0.05, behaviour: parts:other}}}
+    """
+    more = text.replace(
+        'r.tick}}}', 'r.tick}, show: {period: 0.05, behaviour: parts:Counter.show}}}'
+    )
+    child = compose(text, CLASS, '--watch')
+    child.wait_for_line('count 5')
+    edited = CLASS.replace('other 1', 'other 2')
+    compose.write(text, edited)
+    assert child.wait_for_line('reloaded in').endswith(': ~1 timer')
+    child.wait_for_line('other 2')
+    compose.write(more, edited)
+    assert child.wait_for_line('reloaded in', times=2).endswith(': +1 timer')
+    child.wait_for_line('shown ')
+    assert not child.matching('shown False')
+    compose.write(more, edited.replace('> 3', '> 9999'))
+    said = "±1 node, ~1 timer; rebuilt: node 'counter' (lost: its state, "
+    assert said in child.wait_for_line('reloaded in', times=3)
+    child.wait_for_line('shown False')
+    assert child.stop() == 0
