@@ -162,6 +162,25 @@ def test_a_behaviour_in_no_module_hides_no_unknown_parameter(check):
     assert sorted(check(nodes, code)) == [(3, 'unknown-parameter'), (6, 'unknown-behaviour')]
 
 
+@pytest.mark.parametrize(
+    ('key', 'hides'), [('timmers', False), ('paramters', True), ('anything', True)]
+)
+def test_a_misspelt_key_hides_only_what_it_may_have_declared(check, key, hides):
+    nodes = f"""
+  n:
+    parameters: {{speed: 1}}
+    timers: {{b: {{period: 1, behaviour: parts:tick}}}}
+    {key}: {{}}
+"""
+    code = """
+        def tick(node):
+            return node.parameters.spede
+    """
+    found = {rule for _, rule in check(nodes, code)}
+    assert ('unknown-parameter' in found) is not hides
+    assert 'unknown-key' in found
+
+
 @pytest.mark.parametrize('spoilt', ['"a b"', '1st'])
 def test_a_parameter_file_may_be_for_a_node_without_a_right_name(check, tmp_path, spoilt):
     (tmp_path / 'site.yaml').write_text('/talker:\n  ros__parameters: {speed: 1}\n')

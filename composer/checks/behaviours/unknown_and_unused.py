@@ -144,7 +144,7 @@ def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> 
     of_all = _OF_EVERY_NODE if kind == 'parameter' else set()
     if _is_one_of(name, {*getattr(node, section), *of_all}):
         return True
-    return any(path in ((section,), (section, name)) or _is_unknown(path) for path in lost)
+    return any(path in ((section,), (section, name)) or _may_mean(path, section) for path in lost)
 
 
 def _is_one_of(name: str, known: Collection[str]) -> bool:
@@ -158,6 +158,11 @@ def _is_one_of(name: str, known: Collection[str]) -> bool:
 def _is_unknown(path: DataPath) -> bool:
     """Return whether a path in a node is an unknown key, such as a misspelt section."""
     return len(path) == 1 and path[0] not in _KEYS_OF_NODES
+
+
+def _may_mean(path: DataPath, section: str) -> bool:
+    """Return whether a path in a node is an unknown key that may be meant to be a section."""
+    return _is_unknown(path) and find_nearest(path[0], _KEYS_OF_NODES) in (None, section)
 
 
 def _explain_name(

@@ -63,7 +63,12 @@ def _asked_to_stop() -> Iterator[Callable[[], bool]]:
         signal.signal(number, before[number])
 
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    heeded = [each for each in numbers if signal.getsignal(each) is not signal.SIG_IGN]
+    # As `up`: a script has SIGINT ignored in the background, and `nohup` SIGHUP.
+    heeded = [
+        each
+        for each in numbers
+        if each == signal.SIGINT or signal.getsignal(each) is not signal.SIG_IGN
+    ]
     before: dict[int, Any] = {int(each): signal.signal(each, handle) for each in heeded}
     try:
         yield lambda: asked
