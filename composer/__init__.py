@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         SystemStoppingError,
     )
     from composer.runtime.external.exit_actions import Process
+    from composer.runtime.messages.payloads import PayloadError
     from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     'GoalTimeoutError',
     'Node',
     'ParametersRefusedError',
+    'PayloadError',
     'Process',
     'ServiceFailedError',
     'ServiceNotAvailableError',
@@ -52,6 +54,7 @@ __all__ = [
 
 _MODULES = {
     'Node': 'composer.runtime.nodes.behaviour_node',
+    'PayloadError': 'composer.runtime.messages.payloads',
     'Process': 'composer.runtime.external.exit_actions',
     **dict.fromkeys(('check', 'load', 'up'), 'composer.api'),
 }

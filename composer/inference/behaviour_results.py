@@ -43,13 +43,15 @@ def check_results(
     evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire, binding: Binding
 ) -> None:
     """Check what a behaviour gives away, and that it comes to an end."""
-    _check_payloads(evaluator, callee, scope, wire)
+    _check_payloads(evaluator, callee, scope, wire, binding)
     _check_answers(evaluator, scope, binding)
     _note_unpublished(evaluator, scope, wire)
     _check_end(evaluator, callee, binding)
 
 
-def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire) -> None:
+def _check_payloads(
+    evaluator: Evaluator, callee: Function, scope: Scope, wire: Wire, binding: Binding
+) -> None:
     kind = evaluator.functions.kind_of(callee)
     is_generator = kind.is_generator
     returned = wire.ended if is_generator else wire.returned
@@ -64,7 +66,8 @@ def _check_payloads(evaluator: Evaluator, callee: Function, scope: Scope, wire: 
     for value, place in scope.returned:
         with evaluator.run.condition(is_doubt=id(place.node) in scope.doubtful):
             _check(evaluator, returned, value, place)
-    if wire.needs_payload and not _is_stub(callee.definition):
+    is_allowed = binding.may_yield or not is_generator
+    if wire.needs_payload and is_allowed and not _is_stub(callee.definition):
         _check_ways(evaluator, callee, scope, returned)
 
 

@@ -74,6 +74,7 @@ def wrong_feedback(node, goal):
         yield {'sequense': [1]}  # composer: ignore[unknown-field]
     finally:
         node.logger.info('closed')
+    return []
 
 def wrong_result(node, goal):
     return {'sequense': [1]}  # composer: ignore[unknown-field]

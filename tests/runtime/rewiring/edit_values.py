@@ -320,8 +320,9 @@ _OF_CONTAINERS = (
     *('env', 'cwd', 'restart', 'on_exit', 'stop', 'wait_for', 'delay', 'components'),
 )
 _OF_COMPONENTS = (
-    *('foreach', 'when', 'description', 'package', 'plugin', 'namespace', 'parameters'),
-    *('parameter_files', 'remap', 'log_level', 'intra_process', 'wait_for', 'lifecycle'),
+    *('foreach', 'when', 'description', 'package', 'plugin', 'name', 'namespace', 'parameters'),
+    *('parameter_files', 'remap', 'log_level', 'intra_process', 'extra_arguments', 'wait_for'),
+    'lifecycle',
 )
 _OF_DECLARED_NODES = (
     *('publishers', 'subscriptions', 'services', 'service_clients', 'actions', 'action_clients'),

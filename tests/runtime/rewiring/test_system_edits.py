@@ -22,7 +22,7 @@ nodes:
   hanging: {subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hang}}}
 processes:
   deaf:
-    command: [sh, -c, "trap '' INT; echo deaf; while true; do sleep 0.1; done"]
+    command: [sh, -c, "trap '' INT TERM; echo deaf; while true; do sleep 0.1; done"]
     stop: {timeout: 900}
 """
 AFTER = (
