@@ -296,11 +296,17 @@ def _describe(error: Exception) -> str:
     if isinstance(error, SecurityError):
         return f'the expression is not allowed: {error.message}'
     if isinstance(error, TemplateSyntaxError):
-        return str(error.message).replace("'end of template'", 'end of the expression')
+        return describe_syntax(error)
     message = str(error) or type(error).__name__
     if isinstance(error, TemplateError):
         return message
     return f'the expression raised {type(error).__name__}: {message}'
+
+
+def describe_syntax(error: TemplateError) -> str:
+    """Return a syntax error of Jinja in the words of expressions."""
+    message = str(error.message).replace("'end of template'", 'end of the expression')
+    return message.replace('end of template', 'end of the expression').rstrip('.')
 
 
 def _as_data(value: Any) -> Any:

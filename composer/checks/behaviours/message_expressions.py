@@ -16,6 +16,7 @@ from composer.checks.behaviours.sample_values import (
     SampleMessage,
 )
 from composer.expressions.sandbox import Sandbox, too_deep
+from composer.expressions.templates import describe_syntax
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.records import record
 
@@ -53,7 +54,7 @@ def evaluate_over(
     try:
         expression = sandbox.parse_expression(code)
     except TemplateError as error:
-        return [ExpressionFinding('bad-expression', str(error.message))], None
+        return [ExpressionFinding('bad-expression', describe_syntax(error))], None
     types = {'message': FieldType('message', heard.name)}
     types |= {field.name: field.type for field in heard.fields}
     evaluator = SampleEvaluator(sandbox, types, catalogue)

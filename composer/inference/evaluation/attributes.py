@@ -51,7 +51,7 @@ from composer.inference.values import (
     join,
 )
 from composer.interfaces.field_errors import unknown_field
-from composer.spelling import suggest
+from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -276,8 +276,10 @@ class Attributes(Part):
             if self._evaluator.run.types.may_have_constant(owner.type, name):
                 return UNKNOWN
             known = self._evaluator.run.types.constants(owner.type)
-            message = f"{in_python(owner.type)} has no constant '{name}'"
-            return 'unknown-field', message, suggest(name, known, 'it has')
+            # A message also has fields: ROS 1 wrote some of them in capitals.
+            if isinstance(owner, MessageClass) or find_nearest(name, known):
+                message = f"{in_python(owner.type)} has no constant '{name}'"
+                return 'unknown-field', message, suggest(name, known, 'it has')
         error = unknown_field(owner.type, name, [each.name for each in description.fields])
         return 'unknown-field', str(error).replace(owner.type, in_python(owner.type)), error.help
 

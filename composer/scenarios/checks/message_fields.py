@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
+from composer.expressions.templates import describe_syntax
 from composer.interfaces.descriptions import (
     ActionDescription,
     FieldType,
@@ -117,7 +118,7 @@ def _check_text(
                     path, each.rule, each.message, part=each.part, help=each.help
                 )
     except TemplateError as error:
-        yield context.at_value(path, 'bad-expression', str(error.message))
+        yield context.at_value(path, 'bad-expression', describe_syntax(error))
 
 
 class _WithPart:

@@ -106,7 +106,7 @@ WRONG = [
     ({'then': '{topic: /speed, never: "linaer.x > 0"}'},
      "linaer undefined-name: 'linaer' is not defined (did you mean 'linear'?)"),
     ({'then': '{topic: /speed, eventually: "linear.x >"}'},
-     '"linear.x >" bad-expression: unexpected \'end of template\''),
+     '"linear.x >" bad-expression: unexpected end of the expression'),
     ({'then': '{topic: /speed, where: "{{ linear.x }}"}'}, '"{{ linear.x }}" bad-expression: '
      'write it without braces (the whole text is the expression)'),
     ({'then': '{order: [{topic: /speed, where: "linear.x > 0"}, {topic: /speed, where: "x"}]}'},
