@@ -42,7 +42,6 @@ ROOMS = (
         'launch_files',
     ),
     *('virtual_time', 'recordings', 'simulation', 'scenarios'),
-    'suggestions',
     'stubs',
     *('export', 'hosts'),
     'application',

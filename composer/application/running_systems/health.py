@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from socket import gethostname
 from typing import TYPE_CHECKING, Any
 
 from composer.application.running_systems import answer_forms
@@ -12,8 +11,6 @@ from composer.application.running_systems.client import STATUS_SEC, Client
 from composer.application.running_systems.discovery import Discovery
 from composer.errors import ComposerError
 from composer.runtime.control import protocol
-from composer.suggestions.figures import Measured, average_answers
-from composer.suggestions.other_programs import cores_of_others, read_processors
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,37 +41,6 @@ def wait_for_health(ask: Callable[[float], Outcome]) -> dict[str, Any]:
         time.sleep(POLL_SEC)
         document = read_health(ask(STATUS_SEC))
     return document
-
-
-def measure(name: str, seconds: float) -> Measured:
-    """Return what a running system says of itself for some time."""
-    answers = {}
-    with Client() as client:
-        system = Discovery(client).find(name)
-        is_here = (system.status or {}).get('host') == gethostname()
-        before, began, own_sec = read_processors(), time.monotonic(), time.process_time()
-        with client.asking(system, protocol.TOP) as ask:
-            deadline = time.monotonic() + seconds
-            while True:
-                answer = read_health(ask(STATUS_SEC))
-                if answer['has_cpu']:
-                    answers[answer['period']] = answer
-                if time.monotonic() >= deadline and answers:
-                    break
-                if time.monotonic() >= deadline + STATUS_SEC + 3 * answer['period_sec']:
-                    break
-                time.sleep(min(POLL_SEC, answer['period_sec'] / 2))
-        after, elapsed_sec = read_processors(), time.monotonic() - began
-        own_sec = time.process_time() - own_sec
-    entities = average_answers(answers.values())
-    if not entities:
-        message = f"system '{name}' does not say what its calls cost"
-        raise ComposerError(message, help='its interpreter cannot be watched: see docs/running.md')
-    processes = [each for answer in answers.values() for each in answer['processes']]
-    cores = max((each['cores'] for each in processes), default=None)
-    used = sum(each['cpu'] or 0.0 for each in processes) / len(answers) + own_sec / elapsed_sec
-    others = cores_of_others(before, after, used, cores) if is_here and cores else 0.0
-    return Measured(entities, cores, {}, others)
 
 
 class Poller:

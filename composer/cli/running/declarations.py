@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.argument_types import (
-    NUMBERS_ARE_VALUES,
-    split_words,
-    takes_format,
-    takes_settings,
-    takes_system,
-)
+from composer.cli.common.argument_types import takes_format, takes_settings
 from composer.cli.running.asked_system import AskedSystem
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
 
@@ -89,7 +83,14 @@ def ps_command(asked: AskedSystem, format_name: str) -> int:
     show_default=True,
     help='The column to sort by.',
 )
-@click.option('--filter', 'text', default='', metavar='TEXT', help='Only entities with this text.')
+@click.option('--filter', 'text', default='', metavar='TEXT', help='Only rows with this text.')
+@click.option(
+    '--by',
+    type=click.Choice(['entity', 'node']),
+    default='entity',
+    show_default=True,
+    help='What a row is.',
+)
 # For a screen that shows several hosts.
 @click.option('--each-period', is_flag=True, hidden=True)
 def top_command(
@@ -97,18 +98,19 @@ def top_command(
     format_name: str,
     sort: str,
     text: str,
+    by: str,
     *,
     once: bool,
     each_period: bool,
 ) -> int:
-    """Show the health of each entity of SYSTEM in the last period.
+    """Show the health of each entity of SYSTEM, or of each node, in the last period.
 
     Calls in a second, callback times, the share of a processor, messages that wait in the queue;
     and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
     runs, it need not be named; of a FILE that declares hosts, all of these are asked.
     Where the output is no terminal that can draw, and as JSON, it is printed once.
     """
-    view = View(sort=sort, text=text)
+    view = View(sort=sort, text=text, by=by)
     if asked.are_files:
         from composer.cli.hosts.across import top_across
 
@@ -229,67 +231,10 @@ def capture_command(
     return capture(nodes, format_name=format_name, output=output, timeout_sec=timeout_sec)
 
 
-@click.command('suggest', context_settings=NUMBERS_ARE_VALUES)
-@takes_system
-@click.option(
-    '--recording',
-    type=click.Path(path_type=Path),
-    metavar='RECORDING',
-    help='A recording with /diagnostics, as an MCAP file or a folder of rosbag2. '
-    'Default: the running system of this name.',
-)
-@click.option(
-    '--seconds',
-    type=click.FloatRange(min=0),
-    default=10.0,
-    show_default=True,
-    metavar='SEC',
-    help='How long to watch the running system.',
-)
-@click.option(
-    '--cores',
-    type=click.IntRange(min=1),
-    metavar='N',
-    help='How many processor cores there are. Default: those of where it was measured.',
-)
-@click.option('--host', default='', metavar='NAME', help='The host whose part is meant.')
-@click.option(
-    '-o',
-    '--output',
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar='LAYER',
-    help='Write the layer file for it.',
-)
-@takes_format()
-def suggest_command(  # noqa: PLR0913 - one for each option
-    words: tuple[str, ...],
-    set_values: tuple[str, ...],
-    *,
-    recording: Path | None,
-    seconds: float,
-    cores: int | None,
-    host: str,
-    output: Path | None,
-    format_name: str,
-) -> int:
-    """Suggest which nodes of FILE should run in workers.
-
-    From what its callbacks cost while it ran: the running system of that name is watched, or a
-    recording of /diagnostics is read. The result is a layer, as in 'composer up FILE split.yaml',
-    with the gain to expect.
-    """
-    from composer.cli.running.suggest import SuggestOptions, suggest
-
-    paths, values = split_words(words)
-    options = SuggestOptions(recording, seconds, cores, host, output, format_name)
-    return suggest(paths, values, set_values, options)
-
-
 COMMANDS = (
     capture_command,
     ps_command,
     top_command,
-    suggest_command,
     logs_command,
     reload_command,
     restart_command,

@@ -73,8 +73,10 @@ def print_health(document: dict[str, Any], view: View, format_name: str) -> None
     """Print what a system says of its entities."""
     entities = select_entities(document['entities'], view)
     if format_name == 'json':
-        found = {'kept_waiting_by': find_worst(document), 'entities': entities}
-        click.echo(json.dumps({**document, **found}, indent=2))
+        others = {key: value for key, value in document.items() if key != 'entities'}
+        rows = {'nodes' if view.by == 'node' else 'entities': entities}
+        found = {'kept_waiting_by': find_worst(document), **rows}
+        click.echo(json.dumps({**others, **found}, indent=2))
     else:
         lines = map(describe_worst, find_worst(document))
         processes = list_processes(document)

@@ -22,7 +22,7 @@ from composer.cli.running.top_table import (
 from composer.terminal import escape
 
 _REFRESH_MS = 100
-_HELP = 'q quit   ←→ sort   r reverse   / filter   ↑↓ scroll'
+_HELP = 'q quit   ←→ sort   r reverse   n nodes   / filter   ↑↓ scroll'
 _ENTER = ('\n', '\r')
 _ESCAPE = '\x1b'
 _BACKSPACES = ('\x7f', '\b', curses.KEY_BACKSPACE)
@@ -102,6 +102,9 @@ class _Screen:
             self._view = replace(self._view, sort=names[at])
         elif key == 'r':
             self._view = replace(self._view, is_reversed=not self._view.is_reversed)
+        elif key == 'n':
+            by = 'entity' if self._view.by == 'node' else 'node'
+            self._view = replace(self._view, by=by)
         elif key == '/':
             self._is_typing = True
         elif key == _ESCAPE:
@@ -163,7 +166,9 @@ class _Screen:
 
     def _describe(self, document: dict[str, Any], shown: int) -> str:
         order = ', reversed' if self._view.is_reversed else ''
-        count = f'{shown} of {len(document["entities"])} entities'
+        whole = select_entities(document['entities'], replace(self._view, text=''))
+        noun = 'nodes' if self._view.by == 'node' else 'entities'
+        count = f'{shown} of {len(whole)} {noun}'
         text = f'{escape(document["name"])}: {count}, by {self._view.sort}{order}'
         if self._is_typing or self._view.text:
             text += f', filter: {self._view.text}{"_" if self._is_typing else ""}'

@@ -42,6 +42,8 @@ def _times(value: float) -> str:
 
 
 def _describe(entity: Mapping[str, Any]) -> str:
+    if 'kind' not in entity:
+        return str(entity['node'])
     key = f' ({entity["key"]})' if entity['key'] else ''
     return f'{entity["node"]}: {entity["kind"]} {entity["name"]}{key}'.replace(' :', ':').rstrip()
 
@@ -80,6 +82,9 @@ DEFAULT_SORT = 'cpu'
 # Narrower cells are cut as a whole, not node and entity each.
 _SPLIT = 8
 _READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 13
+_OF_NODE = ('host', 'worker', 'node', 'level', 'message')
+_COUNTS = ('calls', 'errors', 'dropped', 'late', 'skipped')
+_SEVERITIES = {'warn': 1, 'error': 2}
 # A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
 _WAITED_MS = 0.5
 _BUSY = 0.1
@@ -92,23 +97,62 @@ class View:
     Attributes:
         sort: A key of `SORT_NAMES`.
         is_reversed: Whether the order is the other one: figures begin with the highest.
-        text: Only entities with this text in their names, in any case.
+        text: Only rows with this text in their names, in any case.
+        by: What a row is: `entity` or `node`.
     """
 
     sort: str = DEFAULT_SORT
     is_reversed: bool = False
     text: str = ''
+    by: str = 'entity'
 
 
 def select_entities(entities: Sequence[Mapping[str, Any]], view: View) -> list[Mapping[str, Any]]:
-    """Return the entities to show, in their order; what is not known comes last."""
+    """Return the rows to show, in their order; what is not known comes last."""
     column = SORT_NAMES[view.sort]
-    shown = [each for each in entities if view.text.lower() in _describe(each).lower()]
+    rows = sum_nodes(entities) if view.by == 'node' else entities
+    shown = [each for each in rows if view.text.lower() in _describe(each).lower()]
     shown.sort(key=_describe)
     known = [each for each in shown if column.value(each) is not None]
     is_text = column in (COLUMNS[0], COLUMNS[-1])
     known.sort(key=column.value, reverse=is_text == view.is_reversed)
     return known + [each for each in shown if column.value(each) is None]
+
+
+def sum_nodes(entities: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for each node: the sums of its entities, and the times of the slowest of them.
+
+    The rate is that of calls: messages that publishers and clients send are not among them.
+    """
+    nodes: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for entity in entities:
+        nodes.setdefault((*_place(entity), entity['node']), []).append(entity)
+    return [_sum_node(own) for own in nodes.values()]
+
+
+def _sum_node(own: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    def known(key: str) -> list[Any]:
+        return [entity[key] for entity in own if entity[key] is not None]
+
+    calls = [
+        (entity['rate_hz'] or 0.0, entity['mean_ms'])
+        for entity in own
+        if entity['mean_ms'] is not None
+    ]
+    calls_hz = sum(rate_hz for rate_hz, _ in calls)
+    busy_ms = sum(rate_hz * mean_ms for rate_hz, mean_ms in calls)
+    worst = max(own, key=lambda entity: _SEVERITIES.get(str(entity.get('level')), 0))
+    return {
+        **{key: worst[key] for key in _OF_NODE if key in worst},
+        'rate_hz': calls_hz,
+        'mean_ms': busy_ms / calls_hz if calls_hz else None,
+        **{key: max(known(key), default=None) for key in ('p99_ms', 'max_ms')},
+        **{key: sum(known(key)) if known(key) else None for key in ('cpu', 'queued')},
+        **{key: sum(entity.get(key, 0) for entity in own) for key in _COUNTS},
+        # 'sent' if anything goes over the middleware.
+        'delivery': max(known('delivery'), default=None),
+        'delivery_reason': '',
+    }
 
 
 def find_worst(document: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -190,6 +234,8 @@ def render_entities(
         ]
         for each in columns
     }
+    if entities and 'kind' not in entities[0]:
+        cells[entity][0] = 'NODE'
     if width is not None:
         cells = _fit(cells, SORT_NAMES[sort], width)
     header, *rows = zip(*cells.values(), strict=True)

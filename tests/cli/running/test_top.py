@@ -128,6 +128,28 @@ def test_workers_are_a_column_where_there_are_any():
     assert [line.split()[-1] for line in render_entities(placed)] == ['WORKER', 'vision', '-']
 
 
+def test_rows_of_nodes_sum_what_their_entities_have():
+    more = [
+        entity('/a', 'odom', kind='publisher', rate_hz=50.0, delivery='local'),
+        entity('/a', 'map', kind='publisher', rate_hz=1.0, delivery='sent', delivery_reason='x'),
+        entity('/b', 'often', rate_hz=30.0, mean_ms=2.0, max_ms=4.0, cpu=0.06, level='warn'),
+        entity(
+            '/b', 'seldom', rate_hz=10.0, mean_ms=6.0, p99_ms=9.0, cpu=0.06, errors=1, queued=2
+        ),
+        entity('/b', 'abroad', cpu=0.5, worker='eyes'),
+    ]
+    view = View(by='node')
+    rows = select_entities([*ENTITIES, *more], view)
+    assert [' '.join(line.split()) for line in render_entities(rows, view.sort)] == [
+        'NODE RATE/S MEAN MS P99 MS MAX MS CPU QUEUE DROPPED LATE ERRORS DELIVERY WORKER',
+        '/a 0.0 - - - 75.0% 0 0 0 7 sent -',
+        '/b 0.0 - - - 50.0% 0 0 0 0 - eyes',
+        '/b 40.0 3.000 21.000 22.500 13.0% 2 0 3 1 - -',
+    ]
+    assert [row.get('level') for row in rows] == [None, None, 'warn']
+    assert select_entities(ENTITIES, View(by='node', text='TIMER')) == []
+
+
 LONG_NAMES = [
     entity(
         f'/fleet/robot_01/obstacle_detection_filter_{each}',
@@ -262,7 +284,7 @@ def test_the_node_is_named_whose_callbacks_keep_the_interpreter(compose, look_un
 
 
 @pytest.mark.ros
-def test_what_calls_cost_is_measured_while_somebody_looks(compose, look_until):
+def test_what_calls_cost_is_measured_while_somebody_looks(compose, look_until, capsys):
     compose(SYSTEM + 'diagnostics: {period: 0.5}\n', CODE).wait_until_ready()
 
     def is_measured(document):
@@ -275,6 +297,11 @@ def test_what_calls_cost_is_measured_while_somebody_looks(compose, look_until):
     document = look_until(is_measured, 'what they cost')
     (idle,) = (each for each in document['entities'] if each['name'] == 'idle')
     assert idle['mean_ms'] >= 20.0
+    assert run(['top', '--once', '--format=json', '--by=node', '--sort=entity']) == 0
+    by_node = json.loads(capsys.readouterr()[0])
+    assert [row['node'] for row in by_node['nodes']] == ['/arm', '/robot/ear']
+    assert by_node['nodes'][0]['cpu'] >= 0.05
+    assert 'entities' not in by_node
 
 
 @pytest.mark.ros
@@ -330,6 +357,9 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
     assert not [line for line in lines if 'busy' in line]
     terminal.type('Escape')
     terminal.shows('3 of 3')
+    terminal.type('n')
+    terminal.shows('system: 2 of 2 nodes', 'NODE', '/robot/ear')
+    terminal.type('n')
     terminal.resize(50, 5)
     terminal.wait_until(
         lambda lines: (
