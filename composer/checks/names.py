@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from composer.confidential import conceal
@@ -109,10 +110,11 @@ def _check_namespaces(context: CheckContext) -> Iterator[Diagnostic]:
 
 
 def _suggest_underscores(name: str, find_problem: Callable[[str], str | None]) -> str | None:
-    """Return the help for a name that only has hyphens or spaces in it."""
+    """Return the help for a name with hyphens, spaces or dots, or with a slash at its end."""
     if conceal(f"'{name}'") != f"'{name}'":
-        return None  # It would show what is hidden, in other words.
-    meant = name.replace('-', '_').replace(' ', '_')
+        # The name itself would show what is hidden.
+        return "replace what is not allowed, as in {{ name | replace('-', '_') }}"
+    meant = re.sub('[-. ]', '_', name).rstrip('/')
     return did_you_mean(None if find_problem(meant) else meant)
 
 
@@ -199,9 +201,11 @@ def _check_ros_name(
     message = f"'{name}' cannot name {with_article(kind)}: {problem}"
     path = (*entity, kind)
     if path in context.system.positions.values:
-        yield context.at_value(path, _RULE, message)
+        help_text = _suggest_underscores(name, find_topic_name_problem)
+        yield context.at_value(path, _RULE, message, help=help_text)
     else:
-        help_text = f"give its name with '{kind}:', and let this be a plain word"
+        otherwise = f"give its name with '{kind}:', and let this be a plain word"
+        help_text = _suggest_underscores(name, find_topic_name_problem) or otherwise
         yield context.at_key(entity, _RULE, message, help=help_text)
 
 

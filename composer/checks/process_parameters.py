@@ -24,6 +24,7 @@ from composer.ros_parameters.parameter_types import (
     suggest_value,
 )
 from composer.spelling import suggest
+from composer.yaml_text.scalars import suggest_flat
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -174,8 +175,10 @@ def _check_mapping(
             yield context.at_key(at, _RULE, f"the parameter '{name}' is given twice")
         else:
             seen[name] = at
-            for place, message in _find_problems(value):
-                yield context.at_value((*at, *place), _RULE, f"parameter '{name}': {message}")
+            for place, problem in _find_problems(value):
+                help_text = suggest_flat(value[place[0]]) if place else None
+                message = f"parameter '{name}': {problem}"
+                yield context.at_value((*at, *place), _RULE, message, help=help_text)
 
 
 def _find_problems(value: Any) -> Iterator[tuple[tuple[int, ...], str]]:

@@ -203,7 +203,7 @@ def _check_value(value: StartValue) -> Iterator[Diagnostic]:
     try:
         read_from_file(value)
     except ComposerError as error:
-        yield diagnostic_at(value.spans[0], 'bad-start-value', str(error), help=error.help)
+        yield diagnostic_at(value.spans[-1], 'bad-start-value', str(error), help=error.help)
 
 
 def _check_command(value: StartValue) -> Iterator[Diagnostic]:

@@ -18,10 +18,13 @@ from jinja2 import TemplateRuntimeError
 from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import KIND_OF_SECTION
 from composer.expressions import SECTIONS, has_conditions, is_conditional, is_variable_name
+from composer.expressions.functions import TRUTH
+from composer.expressions.scanner import OPEN
 from composer.expressions.templates import TemplateEvaluator
 from composer.input_limits import MAX_ENTRIES, MAX_VALUES
 from composer.yaml_text.document import count_values
 from composer.yaml_text.positions import Branch
+from composer.yaml_text.scalars import format_scalar, suggest_bool
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -251,14 +254,15 @@ class _Expansion:
         if path in self._document.dropped:
             return False
         if not isinstance(holds, bool):
-            self._report(path, f'{_WHEN} must be true or false, not {holds!r}')
+            message = f'{_WHEN} must be true or false, not {holds!r}'
+            self._report(path, message, _help_for_condition(condition, holds))
             return False
         return holds
 
-    def _report(self, path: DataPath, message: str) -> None:
+    def _report(self, path: DataPath, message: str, help_text: str | None = None) -> None:
         rule = 'bad-when' if path[len(self._at) + 1] == _WHEN else 'bad-foreach'
         span = self._evaluator.positions.value(path)
-        self._document.diagnostics.append(diagnostic_at(span, rule, message))
+        self._document.diagnostics.append(diagnostic_at(span, rule, message, help=help_text))
 
     def _report_duplicate(
         self, key: str, path: DataPath, variables: Collection[str] | None
@@ -292,6 +296,19 @@ class _Expansion:
                 else None,
             )
         )
+
+
+def _help_for_condition(condition: Any, holds: Any) -> str | None:
+    """Return the help for a condition that is neither true nor false."""
+    meant = TRUTH.get(str(holds).strip().lower())
+    written = str(condition).strip()
+    if OPEN not in written:
+        literal = f'"{OPEN} {written} }}}}"' if meant is None else format_scalar(meant)
+        return suggest_bool(holds) or f'write {literal}'
+    if written.count(OPEN) > 1 or not written.startswith(OPEN):
+        return None
+    begun = f'{OPEN} {written.strip("{} ")}'
+    return f'compare it: {begun} == … }}}}' if meant is None else f'write {begun} | bool }}}}'
 
 
 def _help_for_duplicate(written: str, variables: Collection[str]) -> str:

@@ -76,10 +76,10 @@ def to_bool(value: Any) -> bool:
         TemplateRuntimeError: It is neither that nor `false` or `0`.
     """
     text = str(value).strip().lower()
-    if text not in _TRUTH:
+    if text not in TRUTH:
         message = f'{value!r} is neither true nor false'
         raise TemplateRuntimeError(message)
-    return _TRUTH[text]
+    return TRUTH[text]
 
 
 def from_yaml(text: Any) -> Any:
@@ -119,7 +119,7 @@ def path_join(parts: Any) -> str:
     return posixpath.join(*texts)
 
 
-_TRUTH = {'true': True, '1': True, 'false': False, '0': False}
+TRUTH = {'true': True, '1': True, 'false': False, '0': False}
 _LONGEST_YAML = 10_000
 # Filters beside those of jinja2, with the names that they have in Ansible.
 FILTERS: Mapping[str, Callable[..., Any]] = {

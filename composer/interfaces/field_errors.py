@@ -66,6 +66,8 @@ def unknown_field(message_name: str, key: object, names: Iterable[str]) -> Field
 def no_message(message_name: str, value: object, names: Iterable[str]) -> FieldError:
     """Return the error for a value that cannot become a message."""
     fields = ', '.join(names)
+    if value == 'now':
+        fields += "; only a behaviour knows the time, as in {'stamp': node.now()}"
     return FieldError(
         f'expected {message_name}, got {describe_value(value)}',
         rule='field-type',

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
 from composer.names import with_article
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN, infer_parameter_type
-from composer.yaml_text.scalars import BOOLS, BOOLS_OF_YAML_1_1, TAG_STR
+from composer.yaml_text.scalars import BOOLS, BOOLS_OF_YAML_1_1, TAG_STR, suggest_flat
 from composer.yaml_text.tree import (
     CompositionError,
     MappingNode,
@@ -87,7 +87,8 @@ class ValueReader:
             self._report(node.span, where, help_text)
             return None
         if isinstance(node, MappingNode):
-            self._report(node.span, 'a list of parameters cannot contain mappings')
+            message = 'a list of parameters cannot contain mappings'
+            self._report(node.span, message, suggest_flat({}))
             return None
         return self._read_list(node)
 
@@ -95,9 +96,8 @@ class ValueReader:
         values: list[Any] = []
         for item in node.items:
             if isinstance(item, SequenceNode):
-                self._report(
-                    item.span, 'a list of parameters cannot contain lists', 'write one flat list'
-                )
+                message = 'a list of parameters cannot contain lists'
+                self._report(item.span, message, suggest_flat([]))
                 return None
             value = self.read(item)
             if value is None:

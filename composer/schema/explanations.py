@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from composer.ament import ament_prefixes
 from composer.schema.violations import (
     Violation,
     conflicting_keys,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 
 _KINDS = ('msg', 'srv', 'action')
+_HELP_FOR_TYPES = "'composer interfaces list' shows the types"
 _SEPARATORS = re.compile(r'[/.:]+')
 
 
@@ -78,19 +80,29 @@ def _explain_unknown_keys(error: ValidationError) -> Iterator[Violation]:
     schema = error.schema
     known = schema.get('properties', {})
     path = path_of(error)
+    is_nested = _is_nested_parameter(error)
     for key in error.instance:
         if key in known or any(re.search(p, key) for p in schema.get('patternProperties', {})):
             continue
         same = next((each for each in _OTHER_WORDS.get(key, ()) if each in known), None)
+        shown = show_value(error.instance[key])
+        nested = f'write {path[-1]}.{key}: {shown}' if is_nested else None
         yield Violation(
             'unknown-key',
             f"unknown key '{key}'{owner_of(error)}",
             (*path, key),
             (*path, key),
             at_key=True,
-            help=did_you_mean(same) or suggest(key, known, 'the keys are'),
+            help=did_you_mean(same) or nested or suggest(key, known, 'the keys are'),
             meant=None if same else find_nearest(key, known),
         )
+
+
+def _is_nested_parameter(error: ValidationError) -> bool:
+    """Return whether a parameter is a mapping of others, as in parameter files."""
+    known = {*error.schema.get('properties', {}), 'max', 'min'}
+    is_parameter = error.schema.get('title') == 'parameter' and bool(error.instance)
+    return is_parameter and not any(find_nearest(key, known) for key in error.instance)
 
 
 def _explain_missing_keys(error: ValidationError) -> Iterator[Violation]:
@@ -145,12 +157,15 @@ def _explain_pattern(error: ValidationError) -> Iterator[Violation]:
         yield Violation('bad-value', message, path, path, at_key=True)
         return
     meant = _find_meant_form(error.instance, error.validator_value)
+    is_name = error.instance.isidentifier() and re.search(
+        '/(msg|srv|action)/', error.validator_value
+    )
     yield Violation(
         'bad-value',
         f'expected {expected}; got {show_value(error.instance)}',
         path,
         droppable(path),
-        help=did_you_mean(meant),
+        help=did_you_mean(meant, _HELP_FOR_TYPES if is_name else None),
     )
 
 
@@ -189,6 +204,7 @@ def _explain_bound(error: ValidationError) -> Iterator[Violation]:
         f'expected {_BOUNDS[keyword]} {limit}{unit}{plural}, got {found}',
         path,
         droppable(path),
+        help='write 1' if path[-1] in ('depth', 'qos') and keyword == 'minimum' else None,
     )
 
 
@@ -220,6 +236,8 @@ def _explain_alternatives(error: ValidationError) -> Iterator[Violation]:
     if all('required' in branch and 'type' not in branch for branch in branches):
         if not isinstance(error.instance, dict):
             return  # its type has a finding of its own
+        if _is_nested_parameter(error):
+            return  # its keys have findings of their own
         yield _explain_key_alternatives(error, [branch['required'] for branch in branches])
         return
     by_branch: dict[int, list[ValidationError]] = {}
@@ -285,10 +303,22 @@ def _find_meant_form(text: str, pattern: str) -> str | None:
 
 
 def _as_type(text: str, kind: str) -> str:
+    if re.fullmatch(rf'({kind}/)?\w+', text):
+        return _find_type(text.removeprefix(f'{kind}/'), kind)
     package, *middle, name = [*_SEPARATORS.split(text.strip()), '']
     name = middle.pop() if middle else name
     is_other = any(part in _KINDS and part != kind for part in middle)
     return '' if is_other or len(middle) > 1 else f'{package}/{kind}/{name}'
+
+
+def _find_type(name: str, kind: str) -> str:
+    """Return the full name of a type that an installed package has; empty if none has."""
+    prefixes = ament_prefixes()
+    files = (path for each in prefixes for path in each.glob(f'share/*/{kind}/{name}.{kind}'))
+    packages = sorted(path.parts[-3] for path in files)
+    # Others have copies of the standard ones.
+    packages.sort(key=lambda each: not each.startswith('std_'))
+    return f'{packages[0]}/{kind}/{name}' if packages else ''
 
 
 def _as_behaviour(text: str) -> str:

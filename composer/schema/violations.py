@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.entity_kinds import ENTITY_KINDS
 from composer.records import record
-from composer.yaml_text.scalars import suggest_bool
+from composer.yaml_text.scalars import suggest_bool, suggest_flat
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +28,8 @@ _TYPE_WORDS = {
     'null': 'null',
 }
 _LONGEST_SHOWN = 40
+_QUANTITY = re.compile(r'(?P<number>[-+]?\d+(\.\d*)?)\s*(?P<unit>[A-Za-z]*)')
+_UNITS = {'': 1, 'us': 1e-6, 'ms': 1e-3, 's': 1, 'sec': 1, 'min': 60, 'h': 3600, 'hz': 1}
 
 # The values for missing keys of an entry. Checks skip them: their paths count as dropped.
 _STAND_INS: dict[str, Mapping[str, Any]] = {
@@ -140,6 +143,7 @@ def wrong_type(error: ValidationError, expected: str) -> Violation:
     empty = error.instance is None and expected == 'a mapping'
     help_text = 'write {} for an empty mapping, or remove the key' if empty else None
     is_bool = _TYPE_WORDS['boolean'] in expected
+    help_text = help_text or _suggest_number(error, expected) or _suggest_place(error)
     return Violation(
         'wrong-type',
         f'expected {expected}, got {show_value(error.instance)}',
@@ -147,6 +151,26 @@ def wrong_type(error: ValidationError, expected: str) -> Violation:
         droppable(path),
         help=help_text or (suggest_bool(error.instance) if is_bool else None) or _full_form(error),
     )
+
+
+def _suggest_number(error: ValidationError, expected: str) -> str | None:
+    """Return the help for a number in quotes, or with a unit: times are in s, rates in Hz."""
+    found = _QUANTITY.fullmatch(str(error.instance))
+    factor = _UNITS.get(found['unit'].lower()) if found else None
+    if found is None or factor is None or 'number' not in expected:
+        return None
+    is_wrong = (path_of(error)[-1:] == ('rate',)) != found['unit'].lower().endswith('z')
+    return None if found['unit'] and is_wrong else f'write {float(found["number"]) * factor:g}'
+
+
+def _suggest_place(error: ValidationError) -> str | None:
+    """Return the help for a list or mapping where the language, or ROS, has none."""
+    path = path_of(error)
+    if 'parameters' in path and isinstance(path[-1], int):
+        return suggest_flat(error.instance)
+    if path[:1] != ('args',) or path == ('args',) or not isinstance(error.instance, list | dict):
+        return None
+    return f"write it under 'vars:', or split a text: {{{{ {path[1]}.split(',') }}}}"
 
 
 def _full_form(error: ValidationError) -> str | None:

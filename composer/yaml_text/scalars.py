@@ -91,6 +91,13 @@ def suggest_bool(value: object) -> str | None:
     return None if meant is None else f'write {format_scalar(meant)}'
 
 
+def suggest_flat(item: object) -> str | None:
+    """Return the help for an item of a list that a parameter cannot have."""
+    if isinstance(item, dict):
+        return 'write a list for each of their keys'
+    return 'write one flat list, or a text in quotes' if isinstance(item, list) else None
+
+
 def short_tag(tag: str) -> str:
     """Return a tag as people write it: `!!str` for YAML's own ones."""
     return '!!' + tag.removeprefix(_TAG_PREFIX) if tag.startswith(_TAG_PREFIX) else tag

@@ -23,6 +23,11 @@ _AFTER_GLUED = (
     'mapping values are not allowed in this context',
     "could not find expected ':'",
 )
+_SYNTAX_HELP = {
+    'found character that cannot start any token': 'put a value that begins with it in quotes',
+    'block sequence entries are not allowed in this context': 'write the list as [a, b]',
+    'did not find expected key': 'indent all keys of a mapping alike',
+}
 _QUOTES = ("'", '"')
 # PyYAML 6.0.4 brings a parser that refuses 1,000 levels before it tells of the first.
 _NESTED_TOO_DEEP = 'exceeded maximum nesting depth'
@@ -289,7 +294,9 @@ def _syntax_problem(error: yaml.MarkedYAMLError, source: SourceFile) -> Diagnost
         context += f' that begins on line {begun.line + 1}'
         related = (Related('it begins here', Span(source, begun.line + 1, begun.column + 1)),)
     message = f'this is not YAML: {problem}{context}'
-    return diagnostic_at(span, 'yaml-syntax', message, help=_syntax_help(span), related=related)
+    return diagnostic_at(
+        span, 'yaml-syntax', message, help=_syntax_help(error, span), related=related
+    )
 
 
 def _find_glued_key(error: yaml.MarkedYAMLError, span: Span) -> Diagnostic | None:
@@ -311,14 +318,21 @@ def _find_glued_key(error: yaml.MarkedYAMLError, span: Span) -> Diagnostic | Non
     )
 
 
-def _syntax_help(span: Span) -> str | None:
-    line = span.source.line(span.line)
-    indent = line[: len(line) - len(line.lstrip())]
-    if '\t' in indent or span.text == '\t':
+def _syntax_help(error: yaml.MarkedYAMLError, span: Span) -> str | None:
+    before = span.source.line(span.line)[: span.column - 1].rstrip()
+    if '\t' in before[: len(before) - len(before.lstrip())] or span.text == '\t':
         return 'indent YAML with spaces, not tabs'
-    if line.count(': ') > 1:
+    closing = re.search("'([]}])'", error.problem or '')
+    begun = error.context_mark
+    if closing and begun and (span.text in (']', '}') or begun.line + 1 < span.line):
+        return f"close the bracket with '{closing[1]}'"
+    if span.text == ':' and closing:
+        return "put a comma between entries, and a value that contains ': ' in quotes"
+    if span.text == ':' and error.problem == _AFTER_GLUED[0] and ': ' in before:
         return "put a value that contains ': ' in quotes"
-    return None
+    if before.endswith(_QUOTES) and error.problem in _SYNTAX_HELP:
+        return "put all of the value in quotes, and write '' for a ' in it"
+    return _SYNTAX_HELP.get(error.problem or '')
 
 
 def _character_problem(

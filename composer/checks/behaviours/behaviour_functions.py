@@ -187,7 +187,7 @@ def _explain_missing_module(
         behaviour.path,
         'unknown-behaviour',
         f"there is no module '{module.missing}'",
-        part=behaviour.module,
+        part=module.missing,
         first=True,
         help=otherwise if module.hidden_by else did_you_mean(module.nearest, otherwise),
     )

@@ -144,9 +144,10 @@ def _value_at(data: dict[str, Any], key: str, path: Path) -> Any:
         known = inside if isinstance(inside, dict) else {}
         fitting = [each for each in known if rest == each or rest.startswith(f'{each}.')]
         if not fitting:
-            name = rest.partition('.')[0]
+            begun = key.removesuffix(rest)
             message = f"'{path}' has no key '{key}'"
-            raise StartValueError(message, help=suggest(name, known, 'there are'))
+            options = [f'{begun}{each}' for each in known]
+            raise StartValueError(message, help=suggest(key, options, 'there are'))
         found = max(fitting, key=len)
         inside, rest = known[found], rest[len(found) + 1 :]
     if inside is None:

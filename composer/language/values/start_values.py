@@ -46,7 +46,7 @@ class StartValue:
         type: The type of a parameter; `None` for a text, or as it is in the file.
         is_exact: Whether line breaks at the end of a text belong to it.
         span: Where it is written.
-        spans: Where the words of the command, or the file, are written.
+        spans: Where the words of the command, or the file and the key, are written.
         host: The host whose part needs it; empty for all.
     """
 
@@ -122,7 +122,9 @@ def parse_start_value(
 ) -> StartValue:
     """Return the value that a mapping with `command` or `file` describes."""
     command = tuple(map(_as_word, data.get('command', ())))
-    at = [(*path, 'command', index) for index in range(len(command))] or [(*path, 'file')]
+    at = [(*path, 'command', index) for index in range(len(command))] or [
+        (*path, key) for key in ('file', 'key') if key in data
+    ]
     return StartValue(
         name=name,
         command=command,

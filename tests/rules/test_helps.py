@@ -1,0 +1,159 @@
+"""A help that names what to write works: written in the place of what is marked, less is wrong."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from composer.checks.checker import check_system
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.language.pipeline import load_combinations
+from composer.rules import RULES_FOLDER
+from composer.scenarios.checks import check_scenarios
+from composer.scenarios.scenario_files import load_scenarios
+from tests.rules.test_examples import EXAMPLES
+
+# The helps that name one text for the place of the marked one, or an entry of its mapping.
+TEXTS = [
+    re.compile(r"did you mean '([^']+)'\?.*"),
+    re.compile(r"write ('[^':]+'|\{\{.*\}\}|-?[\w.]+)(?:,.*)?"),
+]
+ENTRY = re.compile(r"write '(\w+: \w+)'(?: if .*)?")
+# The rules with a help that is for people to read, or names a text for another place.
+FOR_PEOPLE = {
+    'after-the-end', 'bad-answer', 'bad-name', 'bad-nodl', 'bad-parameter-file', 'bad-remap',
+    'bad-separator', 'bad-system-argument', 'bad-variable', 'bad-when',
+    'big-crossing-message', 'blocked-group', 'conflicting-domains', 'conflicting-hosts',
+    'conflicting-keys', 'conflicting-types', 'duplicate-constant', 'duplicate-field',
+    'duplicate-host', 'duplicate-key', 'duplicate-node', 'endless-loop', 'ephemeral-ports',
+    'field-text', 'generator-not-allowed', 'ignored-environment', 'ignored-network-key',
+    'incompatible-qos', 'indented-definition', 'long-sleep', 'message-loop',
+    'misplaced-file', 'misread-list', 'missed-deadline', 'missing-argument',
+    'missing-await', 'missing-middleware', 'missing-parameter', 'missing-return',
+    'needs-root', 'never-ends', 'no-clock', 'no-definitions', 'no-effect', 'no-event-loop',
+    'no-lifecycle', 'no-network-path', 'no-value', 'not-handed-over', 'nothing-expected',
+    'nothing-to-run', 'overridden-parameter', 'possible-deadlock', 'process-elsewhere',
+    'read-only-message', 'relay-loop', 'second-server', 'service-deadlock',
+    'shared-across-workers', 'too-many-entries', 'type-mismatch',
+    'unevaluated-expression', 'uninstalled-package', 'unknown-executable',
+    'unknown-parameter', 'unreachable-parameters', 'unreadable-file', 'unset-parameter',
+    'unused-action-client', 'unused-ignore', 'unused-parameter', 'unused-publisher',
+    'unused-service-client', 'unused-state', 'value-cycle', 'wrong-annotation',
+    'yaml-syntax',
+}  # fmt: skip
+# The file with the expression is read by ROS, until its entry has `expressions`.
+ELSEWHERE = {'unevaluated-expression'}
+
+
+def check(path):
+    if path.name.endswith('bad.yaml') and 'cases:' in path.read_text(errors='replace'):
+        return check_scenarios(load_scenarios(path), InterfaceCatalogue())
+    ((_, system),) = load_combinations(path)
+    return check_system(system, InterfaceCatalogue())
+
+
+def read_help(finding):
+    """Return what the help wants: the text of the marked place, and an entry after it."""
+    patterns = [*TEXTS, ENTRY]
+    match = next(filter(None, (each.fullmatch(finding.help or '') for each in patterns)), None)
+    if match is None or finding.span is None:
+        return None
+    return (finding.span.text, match[1]) if match.re is ENTRY else (match[1], None)
+
+
+def apply(finding, text, entry):
+    """Write a text in the place of the marked one, and an entry into the mapping after it."""
+    span = finding.span
+    path = Path(span.source.name)
+    lines = path.read_text().splitlines(keepends=True)
+    line, start = lines[span.line - 1], span.column - 1
+    rest = line[start + span.length :]
+    if entry is not None:
+        rest = re.sub(r': ([^{}\s]+)$', r': {type: \1}', rest)
+        rest = rest.replace('{', f'{{{entry}, ', 1)
+    lines[span.line - 1] = line[:start] + text + rest
+    path.write_text(''.join(lines))
+
+
+@pytest.mark.parametrize('rule', EXAMPLES)
+def test_what_the_help_of_a_rule_says_works(rule, tmp_path, monkeypatch):
+    folder = tmp_path / 'example'
+    shutil.copytree(RULES_FOLDER / rule, folder)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr('sys.dont_write_bytecode', True)
+    before = check(Path('bad.yaml'))
+    edits = [(finding, read_help(finding)) for finding in before if finding.help]
+    for finding, edit in edits:
+        if edit is not None and rule not in ELSEWHERE:
+            shutil.copytree(RULES_FOLDER / rule, folder, dirs_exist_ok=True)
+            apply(finding, *edit)
+            left = [each.message for each in check(Path('bad.yaml')) if each.rule == rule]
+            assert len(left) < len(before), (finding.help, left)
+    assert (rule in FOR_PEOPLE) == (None in [edit for _, edit in edits])
+
+
+# What somebody writes first who knows ROS and YAML: with what is to be written instead, if that
+# is a text for the marked place.
+NODE = 'version: 1\nargs: {mode: sim}\nnodes:\n  n:\n    '
+PARAMETER_FILE = 'n:\n  ros__parameters:\n    footprint: [[0.3, 0.2]]\n'
+HABITS = {
+    'timers: {t: {period: 100ms, publish: p}}': 'write 0.1',
+    'timers: {t: {rate: 10 Hz, publish: p}}': 'write 10',
+    'timers: {t: {rate: "5", publish: p}}': 'write 5',
+    'timers: {t: {period: 10Hz, publish: p}}': None,
+    'timers: {t: {rate: 10ms, publish: p}}': None,
+    'parameters: {gains: {p: 1.0}}': 'write gains.p: 1.0',
+    'parameters: {gains: {defualt: 1.0}}': "did you mean 'default'?",
+    'parameters: {a: [[1, 2], [3]]}': 'write one flat list, or a text in quotes',
+    'parameters: {a: [{id: 1}]}': 'write a list for each of their keys',
+    'parameter_files: [p.yaml]': 'write one flat list, or a text in quotes',
+    '''when: "{{ env('NO_SUCH', 'false') }}"''': "write {{ env('NO_SUCH', 'false') | bool }}",
+    'when: "{{ mode }}"': 'compare it: {{ mode == … }}',
+    'when: "yes"': 'write true',
+    'when: 0': 'write false',
+    '''when: "mode == 'sim'"''': '''write "{{ mode == 'sim' }}"''',
+    'namespace: amr-07.local/': "did you mean '/amr_07_local'?",
+    'subscriptions: {my-scan: {type: std_msgs/msg/String}}': "did you mean 'my_scan'?",
+    'publishers: {o: String}': "did you mean 'std_msgs/msg/String'?",
+    'services: {o: {type: srv/SetBool}}': "did you mean 'std_srvs/srv/SetBool'?",
+    'publishers: {o: Nothing}': "'composer interfaces list' shows the types",
+    'publishers: {o: {type: std_msgs/msg/String, qos: 0}}': 'write 1',
+    'publishers: {o: {type: std_msgs/msg/String, qos: {depth: 0}}}': 'write 1',
+    'publishers: {o: {type: std_msgs/msg/Header}}\n    timers: {t: {rate: 1, publish: o, '
+    'message: {stamp: now}}}': 'give its fields by name: sec, nanosec; only a behaviour knows the '
+    "time, as in {'stamp': node.now()}",
+    'description: %d': 'put a value that begins with it in quotes',
+    'parameters: {format: @d, z: 1}': 'put a value that begins with it in quotes',
+    'description: [a\n    parameters: {z: 1}': "close the bracket with ']'",
+    'parameters: {a: [1, 2}': "close the bracket with ']'",
+    'description: a: b': "put a value that contains ': ' in quotes",
+    'parameters: {a: 1 b: 2}': "put a comma between entries, and a value that contains ': ' in "
+    'quotes',
+    "description: 'it's'": "put all of the value in quotes, and write '' for a ' in it",
+    'description: - a': 'write the list as [a, b]',
+    'timers:\n      t: {rate: 1}\n     u: {rate: 2}': 'indent all keys of a mapping alike',
+}
+ARGUMENTS = "write it under 'vars:', or split a text: {{ names.split(',') }}"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(('written', 'said'), HABITS.items(), ids=range(len(HABITS)))
+def test_a_habit_is_an_error_with_what_to_write(tmp_path, monkeypatch, written, said):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv('NO_SUCH', raising=False)
+    Path('p.yaml').write_text(PARAMETER_FILE)
+    Path('bad.yaml').write_text(f'{NODE}{written}\n')
+    findings = check(Path('bad.yaml'))
+    helps = {finding.help: finding for finding in findings}
+    assert said in helps
+    if (edit := read_help(helps[said])) is not None and not said.startswith('write gains'):
+        apply(helps[said], *edit)
+        assert said not in {finding.help for finding in check(Path('bad.yaml'))}
+
+
+@pytest.mark.parametrize('given', ['[a, b]', '{default: [a]}', '{default: {a: 1}}'])
+def test_an_argument_that_is_a_list_is_told_where_lists_are(tmp_path, given):
+    path = tmp_path / 'system.yaml'
+    path.write_text(f'version: 1\nargs: {{names: {given}}}\nnodes: {{}}\n')
+    assert ARGUMENTS in {finding.help for finding in check(path)}
