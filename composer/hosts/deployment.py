@@ -15,7 +15,6 @@ from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host, plan_removal
 from composer.hosts.left_hosts import Candidates, has_part
 from composer.hosts.moves import order_changes, settle_exchanges
-from composer.network.clock_skew import describe_skew, measure_skew
 from composer.planning.text import STARTS_AGAIN
 
 if TYPE_CHECKING:
@@ -91,10 +90,6 @@ class Deployment:
 
         async def look(agent: HostAgent) -> None:
             self._facts[agent.host.name] = await agent.call('look')
-            found = await measure_skew(lambda: agent.call('clock'))
-            skew = describe_skew(agent.host.name, *found)
-            if skew is not None:
-                self._tell(f'warning: {skew}')
 
         await self._each(look)
         self._facts = {name: self._facts[name] for name in self._agents}

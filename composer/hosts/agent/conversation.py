@@ -2,7 +2,7 @@
 
 Each request is a line of JSON, `{"id": 1, "do": "stage", ...}`, and as many bytes as its `bytes`
 says. Each answer is a line with the same `id`, and `result`, or `error` and `help`. Requests are
-done one after the other, but `ping` and `clock` at once.
+done one after the other, but `ping` at once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import select
 import signal
 import sys
 import threading
-import time
 from typing import TYPE_CHECKING, Any
 
 from composer.hosts.agent.changeover import Transaction
@@ -93,8 +92,8 @@ class Conversation:
         while line := stream.read_line():
             request = json.loads(line)
             data = stream.read(request.pop('bytes', 0))
-            if request['do'] in ('ping', 'clock'):
-                self._answer({'id': request['id'], 'result': time.time_ns()})
+            if request['do'] == 'ping':
+                self._answer({'id': request['id'], 'result': None})
                 continue
             if request['do'] == 'roll_back':
                 # What is under way is not waited for.

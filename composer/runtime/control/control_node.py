@@ -26,7 +26,6 @@ from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
 from composer.runtime.health.diagnostics_publisher import CallWatcher, DiagnosticsPublisher
-from composer.runtime.health.other_clocks import OtherClocks
 from composer.runtime.health.system_state import Outcome, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
@@ -216,15 +215,13 @@ class ControlNode:
         self._services = ControlServices(
             self._node, self._system, self._commands, self._status, self._top
         )
-        state = self._system.state
-        spec = self._system.snapshot.spec
-        if spec.host:
-            OtherClocks(self._node, spec, state)
         self._executor = SystemExecutor(self._context, None, log=self._log)
         self._executor.add_node(self._node)
         # Its interface package is installed with ROS 2, or built for a system with containers.
         if find_spec('composition_interfaces') is not None:
-            self._listing = ComponentListing(self._context, state.name, self._system.list_nodes)
+            self._listing = ComponentListing(
+                self._context, self._system.state.name, self._system.list_nodes
+            )
             self._executor.add_node(self._listing.node)
         self._executor.start()
 

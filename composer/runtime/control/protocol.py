@@ -23,8 +23,6 @@ RESTART: Final = 'restart'
 DOWN: Final = 'down'
 SNAPSHOT: Final = 'snapshot'
 TOP: Final = 'top'
-# Only where a system has parts on other hosts: these ask it for the time, in nanoseconds.
-CLOCK: Final = 'clock'
 
 _STATUS_SERVICE = re.compile(rf'(/.*)?/{_PREFIX}[^/]+/{STATUS}')
 

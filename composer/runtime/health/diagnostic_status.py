@@ -170,7 +170,7 @@ def system_status(
         node: The full name of its control node.
         costs: What its process costs, if that was measured.
     """
-    last, clocks = state.last_reload, sorted(state.clocks.items())
+    last = state.last_reload
     values = {
         **{key: str(value) for key, value in state.who().items()},
         'state': state.word,
@@ -178,10 +178,8 @@ def system_status(
         'last reload': '' if last is None else last.outcome.text,
         'last error': state.last_error,
         **({} if costs is None else _describe_costs(costs)),
-        **{f'clock of {host} (ms)': f'{each.ahead_sec * 1000:+.1f}' for host, each in clocks},
     }
     problems = ['the last reload failed'] if state.last_error else []
-    problems += [f'the clock of {host} differs' for host, each in clocks if each.is_off]
     problems += [state.clock_problem] if state.clock_problem else []
     return DiagnosticStatus(
         name=f'{node}: system',

@@ -35,7 +35,7 @@ class OtherHosts:
     def check(self, node: RosNode) -> None:
         """Look who is there."""
         spec = self._find_spec()
-        others = find_other_hosts(spec)
+        others = [host for host in spec.hosts if spec.host and host != spec.host]
         if not others:
             return
         names = {*node.get_node_names()}
@@ -49,11 +49,6 @@ class OtherHosts:
                 self._missed[host] += 1
                 if self._missed[host] == _MOST_MISSED:
                     system_logger.warning(f"host '{host}' is gone{_describe_losses(spec, node)}")
-
-
-def find_other_hosts(spec: SystemSpec) -> list[str]:
-    """Return the hosts of a system besides the one of this part."""
-    return [host for host in spec.hosts if spec.host and host != spec.host]
 
 
 def _describe_losses(spec: SystemSpec, node: RosNode) -> str:

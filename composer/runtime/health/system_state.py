@@ -42,19 +42,6 @@ class ReloadReport:
     outcome: Outcome
 
 
-@record
-class ClockSkew:
-    """How far the clock of another host is from that of this one.
-
-    Attributes:
-        ahead_sec: How many seconds it is ahead.
-        is_off: Whether that is too much.
-    """
-
-    ahead_sec: float
-    is_off: bool
-
-
 class SystemState:
     """The state of a system, as it changes.
 
@@ -82,7 +69,6 @@ class SystemState:
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
         self.find_processes: Callable[[], list[dict[str, Any]]] = list
-        self.clocks: dict[str, ClockSkew] = {}
         self.clock_problem = ''
         self.begun = time.monotonic()
         self._started = time.time()
