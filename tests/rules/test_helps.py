@@ -157,3 +157,41 @@ def test_an_argument_that_is_a_list_is_told_where_lists_are(tmp_path, given):
     path = tmp_path / 'system.yaml'
     path.write_text(f'version: 1\nargs: {{names: {given}}}\nnodes: {{}}\n')
     assert ARGUMENTS in {finding.help for finding in check(path)}
+
+
+# What somebody writes in a behaviour who knows rclpy, with what is written instead.
+OF_RCLPY = {
+    "node.get_logger().info('x')": 'write node.logger',
+    "print(node.get_parameter('speed').value)": 'write node.parameters.NAME',
+    "node.declare_parameter('speed', 1.0)": "declare it under 'parameters:' of the node",
+    'print(node.get_name())': 'write node.name',
+    'print(node.get_clock().now())': "did you mean 'ros.get_clock'?",
+    'print(node.count_publishers("/x"))': "did you mean 'ros.count_publishers'?",
+    'print(node.nmae)': "did you mean 'name'?",
+    'print(message.K)': "did you mean 'k'?",
+    'await asyncio.sleep(1)': 'call time.sleep, in a group of its own; in a timer, write a '
+    'generator',
+}
+HEARING = """version: 1
+nodes:
+  n:
+    parameters: {speed: 1.0}
+    subscriptions:
+      info: {type: sensor_msgs/msg/CameraInfo, external: true, behaviour: 'habits:hear'}
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(('line', 'said'), OF_RCLPY.items(), ids=range(len(OF_RCLPY)))
+def test_a_habit_of_rclpy_is_an_error_with_what_to_write(tmp_path, monkeypatch, line, said):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr('sys.dont_write_bytecode', True)
+    Path('habits.py').write_text(
+        f'import asyncio\n\n\nasync def hear(node, message):\n    {line}\n'
+    )
+    Path('bad.yaml').write_text(HEARING)
+    (finding,) = (each for each in check(Path('bad.yaml')) if each.file == 'habits.py')
+    assert finding.help.partition(' its fields')[0] == said
+    if said.startswith('did you mean'):
+        apply(finding, *read_help(finding))
+        assert 'habits.py' not in {each.file for each in check(Path('bad.yaml'))}

@@ -74,6 +74,13 @@ NODE_METHODS = frozenset(
         'with_own_state',
     }
 )
+# What behaviours write for methods of rclpy's node; the others are those of `node.ros`.
+_OF_RCLPY = {
+    'declare_parameter': "declare it under 'parameters:' of the node",
+    'get_logger': 'write node.logger',
+    'get_name': 'write node.name',
+    'get_parameter': 'write node.parameters.NAME',
+}
 NODE_ATTRIBUTES = frozenset({'logger', 'name', 'own_state', 'parameters', 'ros', 'state'})
 STORED_IN_NODE = NODE_ATTRIBUTES - {'logger'}
 NAMES_OF_PART: dict[str, frozenset[str]] = {
@@ -221,7 +228,10 @@ class Attributes(Part):
             return PartOfNode(name)
         if name in NODE_METHODS:
             return BoundMethod(NODE, name)
-        return _missing('the node', name, NODE_METHODS | NODE_ATTRIBUTES)
+        kind, message, help_text = _missing('the node', name, NODE_METHODS | NODE_ATTRIBUTES)
+        if name in _OF_RCLPY or name in ros_members():
+            help_text = _OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
+        return kind, message, help_text
 
     def _read_part(
         self, owner: PartOfNode, name: str, place: Place

@@ -70,7 +70,7 @@ _OF_LOOP = frozenset(
 )
 _INSTEAD = {
     'asyncio.gather': 'await one after the other',
-    'asyncio.sleep': 'let a timer go on: write a generator with yield',
+    'asyncio.sleep': 'call time.sleep, in a group of its own; in a timer, write a generator',
 }
 _EMPTY = Constant(int, 0)
 WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
