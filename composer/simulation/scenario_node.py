@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from rcl_interfaces.msg import Log
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
@@ -14,6 +15,8 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from types import SimpleNamespace
+
+    from rclpy.publisher import Publisher
 
     from composer.runtime.nodes.goals import Goal
     from composer.runtime.nodes.live_node import LiveNode
@@ -100,6 +103,11 @@ class ScenarioNode:
         for node in nodes.values():
             for spec in node.spec.actions.values():
                 self._client_of(_resolve(node, spec, 'action'), spec.type)
+
+    def create_log_publisher(self) -> Publisher:
+        """Return a publisher of `/rosout`, as each node of rclpy has one."""
+        profile = QoSProfile(depth=_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        return self._node.ros.create_publisher(Log, '/rosout', profile)
 
     # Topics, services, actions
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+import sys
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakSet
 
+from rcl_interfaces.msg import Log
+from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.publisher import Publisher
+from rclpy.time import Time
 
 from composer.errors import ExitCode
 from composer.names import expand_name
@@ -29,7 +33,8 @@ if TYPE_CHECKING:
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
 _INFO: Final = 20
-_PARAMETER_EVENTS: Final = '/parameter_events'
+# Of their publishers, no message is an event.
+_UNTOLD: Final = frozenset({'/parameter_events', '/rosout'})
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
 
 
@@ -99,7 +104,7 @@ class SimulatedRun(System):
         for node in self._nodes.values():
             if ros in node.ros.publishers and type(message) is ros.msg_type:
                 name = ros.topic_name
-                if name != _PARAMETER_EVENTS:
+                if name not in _UNTOLD:
                     self._handle.tell('message', node.full_name, name, message)
 
     @property
@@ -133,30 +138,57 @@ def _without_waits(node: NodeSpec, own: Collection[str]) -> NodeSpec:
     return replace(node, wait_for=conditions) if conditions != node.wait_for else node
 
 
-@contextmanager
-def observed_log(observe: Observe, *, is_shown: bool) -> Iterator[None]:
-    """Have `observe` told of the lines of all loggers meanwhile, with the nodes they belong to.
+class ObservedLog:
+    """What all loggers write: it is observed, and published on `/rosout`, in virtual time.
+
+    Nothing of it goes to rcutils, which stamps it in real time.
 
     Args:
-        is_shown: Whether they go where they go otherwise, too.
+        observe: Is told of each line, with the full name of the node that it belongs to.
+        now_ns: Returns the virtual time, in ns since 1970.
+        is_shown: Whether the lines are printed, too.
+
+    Attributes:
+        publisher: Of `/rosout`; `None` before there is one.
     """
-    log = _rclpy.rclpy_logging_rcutils_log
 
-    def tell(severity: Any, name: str, text: str, *place: Any) -> None:
-        if name == system_logger.name:
-            name = ''
-            if int(severity) <= _INFO:
-                return  # It counts the node of the scenario.
-        node = f'/{name.replace(".", "/")}' if name else ''
-        observe('log', node, _LEVELS.get(int(severity), str(severity)), str(text))
-        if is_shown:
-            log(severity, name, text, *place)
+    def __init__(self, observe: Observe, now_ns: Callable[[], int], *, is_shown: bool) -> None:
+        self._observe = observe
+        self._now_ns = now_ns
+        self._is_shown = is_shown
+        self.publisher: Publisher | None = None
 
-    _rclpy.rclpy_logging_rcutils_log = tell
-    try:
-        yield
-    finally:
-        _rclpy.rclpy_logging_rcutils_log = log
+    @contextmanager
+    def replacing(self) -> Iterator[None]:
+        """Take the lines meanwhile."""
+        log = _rclpy.rclpy_logging_rcutils_log
+        _rclpy.rclpy_logging_rcutils_log = self._take
+        try:
+            yield
+        finally:
+            _rclpy.rclpy_logging_rcutils_log = log
+
+    def _take(self, severity: Any, name: str, text: str, *place: Any) -> None:
+        is_of_system = name == system_logger.name
+        if is_of_system and int(severity) <= _INFO:
+            return  # It counts the node of the scenario.
+        level = _LEVELS.get(int(severity), str(severity))
+        node = '' if is_of_system or not name else f'/{name.replace(".", "/")}'
+        self._observe('log', node, level, str(text))
+        stamp = Time(nanoseconds=self._now_ns())
+        if self._is_shown:
+            seconds, rest_ns = stamp.seconds_nanoseconds()
+            line = f'[{level.upper()}] [{seconds}.{rest_ns:09}] [{name}]: {text}'
+            sys.stderr.write(f'{line}\n')
+            sys.stderr.flush()
+        if self.publisher is None or not node:
+            return
+        function, file, number = (*place, '', '', 0)[:3]
+        message = Log(stamp=stamp.to_msg(), level=int(severity), name=name, msg=str(text))
+        message.file, message.function, message.line = str(file), str(function), int(number)
+        # It goes with the nodes at the end.
+        with suppress(InvalidHandle):
+            self.publisher.publish(message)
 
 
 class _Nothing:

@@ -25,7 +25,7 @@ from composer.simulation.events import Event
 from composer.simulation.missed_deadlines import MissedDeadlines
 from composer.simulation.project_modules import forgotten_modules, list_project_modules
 from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
-from composer.simulation.simulated_run import SimulatedRun, observed_log, without_processes
+from composer.simulation.simulated_run import ObservedLog, SimulatedRun, without_processes
 from composer.virtual_time.clocks import to_ns
 from composer.virtual_time.replacements import replaced
 from composer.virtual_time.ros_clocks import simulated_clocks
@@ -89,7 +89,11 @@ class SimulatedSystem:
         self._threads = SimulatedThreads(shuffle, real_limit_sec)
         self._seed = seed
         self._start_time_ns = START_TIME_NS if start_time_ns is None else start_time_ns
-        self._shows_log = shows_log
+        self._log = ObservedLog(
+            self._observe,
+            lambda: self._start_time_ns + self._threads.now_ns,
+            is_shown=shows_log,
+        )
         self._stack = ExitStack()
         self._run: SimulatedRun | None = None
         self._node: ScenarioNode | None = None
@@ -160,7 +164,7 @@ class SimulatedSystem:
             message = 'another simulated system runs in this process'
             raise StartError(message)
         stack.callback(_one_at_a_time.release)
-        stack.enter_context(observed_log(self._observe, is_shown=self._shows_log))
+        stack.enter_context(self._log.replacing())
         self._watch = stack.enter_context(replaced(threads, self._start_time_ns, self._seed))
         stack.enter_context(simulated_clocks(threads, self._start_time_ns))
         with threads.entered():
@@ -170,6 +174,7 @@ class SimulatedSystem:
     def _on_created(self) -> None:
         nodes = self._running.nodes
         self._node = ScenarioNode(nodes)
+        self._log.publisher = self._node.create_log_publisher()
         self._deadlines = MissedDeadlines(nodes.values(), self._threads)
         for prepare in self._prepared:
             prepare(self._node)
@@ -189,7 +194,7 @@ class SimulatedSystem:
         functions, _findings = import_behaviours(context, context.spec)
         if self._watch is not None:
             for path in list_project_modules(folders, before).values():
-                self._watch.watch_numpy_clocks(path)
+                self._watch.watch_lines(path)
         snapshot = take_snapshot(context, prefixes)
         driver = load_system_text(_DRIVER_FILE).spec
         spec = without_processes(snapshot.spec, driver.nodes if driver else {})
@@ -226,11 +231,19 @@ class SimulatedSystem:
         run = self._running
         until_ns = self._threads.now_ns + timeout_ns
 
-        def is_over() -> object:
-            return run.stop_requested or (condition is not None and condition())
-
-        self._threads.wait_until(is_over, until_ns - self._threads.now_ns, is_late=True)
-        return condition is not None and bool(condition())
+        threads = self._threads
+        holds, is_in_time = False, True
+        while is_in_time and not (holds or run.stop_requested):
+            # The condition may wait itself, so it is asked in a turn of this thread, whenever
+            # another thread has had one.
+            turns = threads.turns
+            is_in_time = threads.wait_until(
+                lambda: run.stop_requested or (condition is not None and threads.turns > turns),  # noqa: B023 - called meanwhile
+                until_ns - threads.now_ns,
+                is_late=True,
+            )
+            holds = condition is not None and bool(condition())
+        return holds
 
     def forward_until(self, condition: Callable[[], object], timeout: float = 60.0) -> bool:
         """Let virtual time pass until a condition holds; return whether it did in time."""

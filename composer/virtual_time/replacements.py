@@ -7,6 +7,8 @@ tries, without blocking, what it would block for, as long as others run.
 from __future__ import annotations
 
 import _random
+import gc
+import itertools
 import os
 import random
 import subprocess
@@ -14,7 +16,9 @@ import sys
 import tempfile
 import threading
 import uuid
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from composer.virtual_time.blocking_calls import blocking_calls
@@ -24,7 +28,7 @@ from composer.virtual_time.replaced_functions import ReplacedFunction, ReplacedM
 from composer.virtual_time.unrepeatable import THREAD, Watch, begin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
@@ -64,6 +68,11 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
     with ExitStack() as stack:
         _running.append(threads)
         stack.callback(_running.remove, threads)
+        if gc.isenabled():
+            # The simulated threads collect it, in turns of their own.
+            gc.collect()
+            gc.disable()
+            stack.callback(gc.enable)
         stack.callback(begin(watch))
         for each in (
             clocks(threads, start_time_ns, watch.note_work),
@@ -82,8 +91,70 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
         for owner, name, value in attributes:
             stack.callback(setattr, owner, name, getattr(owner, name))
             setattr(owner, name, value)
+        stack.enter_context(_numbered(threads))
         stack.enter_context(_seeded(seed))
         yield watch
+
+
+@contextmanager
+def _numbered(threads: SimulatedThreads) -> Iterator[None]:
+    """Number the threads, pools and futures that are made meanwhile, in their names and hashes.
+
+    Pools keep threads and futures in sets, whose order is otherwise that of addresses.
+    """
+    hashes = itertools.count(1)
+    with ExitStack() as stack:
+        for owner, (keyword, place, write_name, is_hashed) in _NUMBERED.items():
+            begun: Any = owner.__init__
+            stack.callback(setattr, owner, '__init__', begun)
+            naming = keyword, place, partial(write_name, itertools.count())
+            owner.__init__ = _numbering(threads, begun, naming, hashes if is_hashed else None)
+            if is_hashed and owner.__hash__ is not _hash_by_number:
+                owner.__hash__ = _hash_by_number
+        yield
+
+
+def _name_thread(numbers: Iterator[int], keywords: Mapping[str, Any]) -> str:
+    target = getattr(keywords.get('target'), '__name__', '')
+    name = f'Thread-{next(numbers) + 1}'
+    return f'{name} ({target})' if target else name
+
+
+def _name_pool(numbers: Iterator[int], _keywords: Mapping[str, Any]) -> str:
+    return f'ThreadPoolExecutor-{next(numbers)}'
+
+
+# What takes a name, its place among the arguments, what writes one that was not given, and whether
+# it is hashed by its number.
+_NUMBERED: Final[dict[Any, tuple[str, int, Callable[..., str], bool]]] = {
+    threading.Thread: ('name', 2, _name_thread, True),
+    ThreadPoolExecutor: ('thread_name_prefix', 1, _name_pool, False),
+    Future: ('', 0, _name_pool, True),
+}
+
+
+def _numbering(
+    threads: SimulatedThreads,
+    begun: Callable[..., None],
+    naming: tuple[str, int, Callable[[Mapping[str, Any]], str]],
+    hashes: Iterator[int] | None,
+) -> Callable[..., None]:
+    keyword, place, write_name = naming
+
+    def begin_numbered(self: Any, *arguments: Any, **keywords: Any) -> None:
+        if threads.mine() is not None:
+            if hashes is not None:
+                self._simulated_number = next(hashes)
+            if keyword and len(arguments) <= place and not keywords.get(keyword):
+                keywords[keyword] = write_name(keywords)
+        begun(self, *arguments, **keywords)
+
+    return begin_numbered
+
+
+def _hash_by_number(self: Any) -> int:
+    number: int | None = self.__dict__.get('_simulated_number')
+    return object.__hash__(self) if number is None else number
 
 
 @contextmanager

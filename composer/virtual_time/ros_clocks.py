@@ -7,22 +7,26 @@ clocks read the time in C; they are asked here instead.
 
 from __future__ import annotations
 
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from copy import copy
 from typing import TYPE_CHECKING, Any, Final
+from weakref import WeakSet
 
 import rclpy.node
 import rclpy.timer
 from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 
 from composer.virtual_time.clocks import MONOTONIC_START_NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-    from rclpy.duration import Duration
 
     from composer.virtual_time.simulated_threads import SimulatedThreads
 
@@ -109,6 +113,7 @@ def _replacements(
         used = clock if threads.mine() is None else simulated
         create_timer(self, callback, group, period_ns, used, **options)
 
+    yield from _ends(threads)
     wait_set: Any = _rclpy.WaitSet
     yield wait_set, 'wait', _waits_in_steps(threads, wait_set.wait)
     yield rclpy.node, 'ROSClock', create_ros_clock
@@ -130,3 +135,60 @@ def _waits_in_steps(threads: SimulatedThreads, wait: Any) -> Callable[..., None]
             threads.sleep(_STEP_NS if timeout_ns < 0 else min(timeout_ns, _STEP_NS))
 
     return wait_in_steps
+
+
+# How long the middleware may take, in real time, to bring what is latched.
+_LATCHED_SEC: Final = 10.0
+# The place of the QoS among the arguments of rclpy's methods, after the node.
+_QOS_PLACES: Final = {'create_publisher': 2, 'create_subscription': 3}
+
+
+def _ends(threads: SimulatedThreads) -> Iterator[tuple[Any, str, Callable[..., Any]]]:
+    """Yield what makes publishers and subscriptions that the middleware keeps no real time for.
+
+    A late subscription has at once what its publishers keep for it, which a thread of the
+    middleware brings; and no message grows too old.
+    """
+    latched: WeakSet[Publisher] = WeakSet()
+
+    def creating(create: Callable[..., Any], place: int) -> Callable[..., Any]:
+        def create_end(self: Any, *arguments: Any, **options: Any) -> Any:
+            if threads.mine() is None:
+                return create(self, *arguments, **options)
+            if 'qos_profile' in options:
+                options['qos_profile'] = _without_lifespan(options['qos_profile'])
+            elif len(arguments) > place:
+                given = list(arguments)
+                given[place] = _without_lifespan(given[place])
+                arguments = tuple(given)
+            end = create(self, *arguments, **options)
+            if end.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                if isinstance(end, Publisher):
+                    latched.add(end)
+                else:
+                    _await_latched(threads, latched, end)
+            return end
+
+        return create_end
+
+    for name, place in _QOS_PLACES.items():
+        yield rclpy.node.Node, name, creating(getattr(rclpy.node.Node, name), place)
+
+
+def _await_latched(
+    threads: SimulatedThreads, latched: WeakSet[Publisher], subscription: Any
+) -> None:
+    """Wait until a subscription has what the publishers of its topic keep for it."""
+    # Sets are in the order of addresses, but who is waited for first makes no difference.
+    for publisher in list(latched):
+        with suppress(InvalidHandle, _rclpy.RCLError), threads.outside():
+            if publisher.topic_name == subscription.topic_name:
+                publisher.wait_for_all_acked(Duration(seconds=_LATCHED_SEC))
+
+
+def _without_lifespan(qos: Any) -> Any:
+    if not isinstance(qos, QoSProfile) or not qos.lifespan.nanoseconds:
+        return qos
+    endless = copy(qos)
+    endless.lifespan = Duration()
+    return endless

@@ -7,6 +7,7 @@ but one is parked on a lock of its own.
 
 from __future__ import annotations
 
+import gc
 import heapq
 import itertools
 import logging
@@ -21,7 +22,7 @@ from composer.errors import ComposerError, EndedWhileWaitingError
 from composer.virtual_time.originals import MOST_LOOKS, REAL
 from composer.virtual_time.preemption import Preemption
 from composer.virtual_time.simulated_thread import Call, SimulatedThread, Wait
-from composer.virtual_time.stuck_threads import StuckWatch
+from composer.virtual_time.stuck_threads import StuckWatch, describe_waits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,16 +37,28 @@ _MOST_ROUNDS: Final = 1000
 _LOOKS_PER_STEP: Final = 100
 _LOOKS_PER_WAIT: Final = 10
 _STEP_NS: Final = 1_000_000
+# After so many waits, young garbage is collected; after so many of these times, all of it.
+_WAITS_PER_COLLECTION: Final = 1000
+_COLLECTIONS_PER_FULL_ONE: Final = 20
 
 # When, whether after all else at that time, a number that keeps the order, and what.
 _Due: TypeAlias = 'tuple[int, int, int, Wait | Call]'
 
 
+class WaitingWhilePickingError(ComposerError):
+    """What is only asked whether something has come waits itself."""
+
+    def __init__(self) -> None:
+        message = 'a finalizer or a condition waits while it is looked for what comes next'
+        super().__init__(message, help='wait in a behaviour, or in a thread of its own')
+
+
 class NothingHappensError(ComposerError):
     """All threads wait for something that can never come, as there is no time-out."""
 
-    def __init__(self) -> None:
-        super().__init__('everything waits for something that nobody is going to do')
+    def __init__(self, places: str | None) -> None:
+        message = 'everything waits for something that nobody is going to do'
+        super().__init__(message, help=places)
 
 
 def _refuse(_record: object) -> bool:
@@ -84,6 +97,7 @@ class SimulatedThreads:
         self._numbers = itertools.count()
         self._visitor: SimulatedThread | None = None
         self._is_closing = False
+        self._waits_begun = 0
         # Of the thread that looks for the next turn now; 0 for nobody.
         self._picking_ident = 0
         self._watch = StuckWatch(limit_sec)
@@ -210,6 +224,9 @@ class SimulatedThreads:
         if me.ident != _get_ident():
             # It was given up, or has ended: others go on without it.
             raise SystemExit
+        if self._picking_ident:
+            raise WaitingWhilePickingError
+        self._collect_garbage()
         if self._is_closing and me is not self._visitor and self._must_end(me, timeout_ns):
             raise EndedWhileWaitingError
         if me.on_wait is not None:
@@ -230,6 +247,18 @@ class SimulatedThreads:
         finally:
             self._end(wait)
         return wait.has_succeeded
+
+    def _collect_garbage(self) -> None:
+        """Collect garbage at times that depend on nothing but the waits until now.
+
+        Python would do it whenever objects are made, also in a thread without a turn and while
+        the next one is looked for. A thread of its own does it, as finalizers may wait.
+        """
+        self._waits_begun += 1
+        if self._waits_begun % _WAITS_PER_COLLECTION or self._is_closing or gc.isenabled():
+            return
+        collections = self._waits_begun // _WAITS_PER_COLLECTION
+        self.start(gc.collect, 2 if collections % _COLLECTIONS_PER_FULL_ONE == 0 else 1)
 
     def sleep(self, duration_ns: int) -> None:
         """Let so much time pass."""
@@ -411,7 +440,7 @@ class SimulatedThreads:
         if self._visitor is not None and self._is_closing:
             self._ready.append(self._visitor)
         else:
-            self._tell(NothingHappensError())
+            self._tell(NothingHappensError(describe_waits(self.by_ident.values())))
 
     def _tell(self, error: BaseException) -> None:
         """Raise an error where the thread from outside waits."""

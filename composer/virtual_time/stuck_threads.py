@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import ctypes
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from composer.errors import ComposerError
 from composer.runtime.costs.thread_clock import read_thread_clock_ns
 from composer.virtual_time.originals import REAL
+from composer.virtual_time.preemption import is_own_code
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from composer.virtual_time.simulated_thread import SimulatedThread
 
 # A thread that waits in C does no work: it may take so much longer.
@@ -18,6 +23,8 @@ _WAITED_FACTOR: Final = 3
 _END_SEC: Final = 1.0
 _LOOK_SEC: Final = 0.01
 _NS_PER_SEC: Final = 1e9
+# How many threads an error names.
+_MOST_PLACES: Final = 5
 
 
 class SimulationStuckError(ComposerError):
@@ -32,6 +39,24 @@ class SimulationStuckError(ComposerError):
         advice = 'virtual time passes only while everything waits; a loop without waits never ends'
         super().__init__(message, help=advice)
         self.thread = thread
+
+
+def describe_waits(threads: Iterable[SimulatedThread]) -> str | None:
+    """Return where the code of a project waits in these threads; `None` if it does nowhere."""
+    frames = sys._current_frames()  # noqa: SLF001 - the only way
+    places = []
+    for thread in threads:
+        frame = frames.get(thread.ident) if not thread.is_over else None
+        while frame is not None and not is_own_code(frame.f_code.co_filename):
+            frame = frame.f_back
+        if frame is not None:
+            code = frame.f_code
+            places.append(f'{Path(code.co_filename).name}:{frame.f_lineno} in {code.co_name}')
+    if not places:
+        return None
+    more = len(places) - _MOST_PLACES
+    listed = ', '.join(places[:_MOST_PLACES]) + (f' and {more} more' if more > 0 else '')
+    return f'behaviours wait at {listed}'
 
 
 class StuckWatch:

@@ -41,6 +41,7 @@ _C_CLOCKS: Final = (
     *('nanosleep', 'clock_nanosleep', 'usleep', 'sleep'),
 )
 _C_CLOCK: Final = 'reads a clock in C, or sleeps there: that is real time'
+_BY_ADDRESS: Final = 'begins coroutines in the order of their addresses'
 # What numpy takes for the time of its own clock.
 _NOW: Final = ('now', 'today')
 _TEMPORARY: Final = 'makes a temporary file or folder, which has another name in each run'
@@ -122,7 +123,7 @@ class Watch:
         self.notices: dict[Notice, None] = {}
         self.hears_others = False
         self._threads = threads
-        self._lines: dict[str, set[int]] = {}
+        self._lines: dict[str, dict[int, str]] = {}
         self._own_sockets: set[object] = set()
 
     def on_audit(self, event: str, arguments: tuple[Any, ...]) -> None:
@@ -164,16 +165,20 @@ class Watch:
         """Note that a clock is read that counts work."""
         self.note(WORK.format(name), is_asked=True)
 
-    def watch_numpy_clocks(self, path: Path) -> None:
-        """Note when a line of a project asks numpy for the time, which reads it in C."""
+    def watch_lines(self, path: Path) -> None:
+        """Note when a line asks numpy for the time, or asyncio for what ends first."""
         source = path.read_bytes() if path.suffix == '.py' else b''
-        if b'datetime64' not in source:
+        if b'datetime64' not in source and b'as_completed' not in source:
             return
         for each in ast.walk(ast.parse(source)):
-            if isinstance(each, ast.Call) and ast.unparse(each.func).endswith('datetime64'):
-                first = each.args[0] if each.args else None
-                if isinstance(first, ast.Constant) and first.value in _NOW:
-                    self._lines.setdefault(str(path), set()).add(each.lineno)
+            if not isinstance(each, ast.Call):
+                continue
+            name, first = ast.unparse(each.func), each.args[0] if each.args else None
+            is_now = isinstance(first, ast.Constant) and first.value in _NOW
+            if name.endswith('datetime64') and is_now:
+                self._lines.setdefault(str(path), {})[each.lineno] = _C_CLOCK
+            elif name == 'asyncio.as_completed':
+                self._lines.setdefault(str(path), {})[each.lineno] = _BY_ADDRESS
         if self._lines and self._threads.begin_tracing is None:
             self._threads.begin_tracing = lambda: sys.settrace(self._on_call)
 
@@ -182,8 +187,8 @@ class Watch:
 
     def _on_line(self, frame: FrameType, event: str, _argument: object) -> Any:
         file = frame.f_code.co_filename
-        if event == 'line' and frame.f_lineno in self._lines[file]:
-            self.notices[Notice(_C_CLOCK, file, frame.f_lineno)] = None
+        if event == 'line' and (what := self._lines[file].get(frame.f_lineno)):
+            self.notices[Notice(what, file, frame.f_lineno)] = None
         return self._on_line
 
     def telling(self) -> Iterator[tuple[ReplacedFunction | ReplacedMethod, Any]]:

@@ -59,6 +59,10 @@ def test_forward_until_a_condition_holds(simulate):
         assert system.now == 1.5
         assert not system.forward_until(lambda: False, timeout=1.0)
         assert system.now == 2.5
+        # One that waits itself: the service takes 0.75 s each time.
+        calls = iter(range(10))
+        assert system.forward_until(lambda: system.call('ask') and next(calls) == 2)
+        assert system.now == 2.5 + 3 * 0.75
 
 
 def test_a_test_publishes_calls_and_sets(simulate):

@@ -396,7 +396,9 @@ def test_what_comes_next_is_looked_for_in_virtual_time_in_threads_of_any_state(s
             (MONOTONIC_START_NS + now_ns) / 1e9,
             (START_NS + now_ns) / 1e9,
         )
-        clocks.setdefault((place, threading.get_ident()), []).append(is_virtual)
+        # Not once the simulation has ended.
+        if threads.current is not None:
+            clocks.setdefault((place, threading.get_ident()), []).append(is_virtual)
 
     class Kept:
         def __del__(self):

@@ -49,12 +49,14 @@ class CaseRuns:
             yield from self._list_finished()
 
     def write_trace(self, path: Path) -> None:
-        """Write the events of all cases, in the default orders, to one file."""
+        """Write the events of all cases, in all orders that were tried, to one file."""
         with path.open('wb') as trace:
             for index, report in enumerate(self.reports):
-                if report.name:
-                    trace.write(f'# {report.title} seed {report.result.seed}\n'.encode())
-                    part = self._trace(index, 0)
+                results = [report.result, *(attempt.result for attempt in report.attempts)]
+                for attempt, result in enumerate(results if report.name else ()):
+                    order = ' shuffled' if attempt else ''
+                    trace.write(f'# {report.title} seed {result.seed}{order}\n'.encode())
+                    part = self._trace(index, attempt)
                     trace.write(part.read_bytes() if part.exists() else b'')
 
     def _requests(self) -> dict[tuple[int, int], CaseRequest]:
@@ -99,7 +101,8 @@ class CaseRuns:
             traces = self._trace(index, 0), self._trace(index, attempt)
             difference = compare_orders(*traces, results[attempt].seed)
             attempts.append(Attempt(results[attempt], difference, differs=bool(difference)))
-            traces[1].unlink(missing_ok=True)
+            if self._options.trace is None:
+                traces[1].unlink(missing_ok=True)
         return CaseReport(
             file=case.file,
             name=case.name,

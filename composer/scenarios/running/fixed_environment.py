@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,8 @@ FIXED: Mapping[str, str] = {
 ISOLATED: Mapping[str, str] = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF',
     'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
+    # Fast DDS reads profiles from the working folder, too, which may have messages come late.
+    'SKIP_DEFAULT_XML_FILE': '1',
 }
 # They would choose another middleware, other peers, another clock or another form of the log.
 _CLEANED_PREFIXES = ('ROS_', 'RMW_', 'RCUTILS_', 'FASTDDS_', 'FASTRTPS_', 'CYCLONEDDS_', 'ZENOH_')
@@ -64,12 +67,18 @@ def isolated_environment() -> Iterator[None]:
     """Keep the systems of this process from all others meanwhile; what is fixed stays as it is."""
     before = dict(os.environ)
     with tempfile.TemporaryDirectory(prefix='composer-log-', ignore_cleanup_errors=True) as folder:
-        for name in filter(is_cleaned_of_ros, before):
+        for name in filter(_is_isolated, before):
             del os.environ[name]
-        os.environ.update({**ISOLATED, 'ROS_LOG_DIR': folder})
+        os.environ.update({**ISOLATED, 'ROS_LOG_DIR': folder, 'TZ': FIXED['TZ']})
+        time.tzset()
         try:
             yield
         finally:
-            for name in filter(is_cleaned_of_ros, list(os.environ)):
+            for name in filter(_is_isolated, list(os.environ)):
                 del os.environ[name]
-            os.environ.update({name: before[name] for name in filter(is_cleaned_of_ros, before)})
+            os.environ.update({name: before[name] for name in filter(_is_isolated, before)})
+            time.tzset()
+
+
+def _is_isolated(name: str) -> bool:
+    return name == 'TZ' or name in ISOLATED or is_cleaned_of_ros(name)

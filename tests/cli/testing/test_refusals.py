@@ -58,7 +58,7 @@ CASES = [
     ('works', 'fails', '', '{exit_code: 1}', []),
     ('fails', 'works', '', '{error: driver, text: no motor}', [
         'on_start of /driver raised OSError: no port at 0 s',
-        'expected an error of /driver with "no motor", got no error']),
+        'expected an error of /driver with "no motor", got none among 1 error']),
     *(('fails', 'works', '', f'{{exit_code: {code}}}',
        [f'expected the system to end with exit code {code}, got 1 at 0.0005 s']) for code in (0, 2)),
     ('fails', 'works', '{at: 1, call: /driver/get_parameters}', '{exit_code: 1}',
