@@ -120,8 +120,7 @@ def find_environment_problems(
     for name in _MIDDLEWARES:
         middleware = variables.get(name)
         if middleware and installed and middleware not in installed:
-            message = f"no middleware '{middleware}' is installed"
-            message = message if name == _MIDDLEWARES[0] else f'{name}: {message}'
+            message = f"{name}: no middleware '{middleware}' is installed"
             yield name, message, suggest(middleware, installed, 'there are')
     yield from _find_bad_values(variables)
 

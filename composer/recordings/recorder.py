@@ -135,7 +135,7 @@ class Recorder:
         counts: Counter[str] = Counter()
         for channel in self._writer.channels:
             counts[channel.topic] += channel.count
-        messages, topics = counts.total(), len(+counts)
+        messages, topics = counts.total(), len(counts)
         return (
             f'{messages} message{"" if messages == 1 else "s"} '
             f'of {topics} topic{"" if topics == 1 else "s"}'

@@ -144,7 +144,7 @@ def test_a_module_that_is_not_python_is_one_finding(check):
   m:
     on_start: parts:one
 """
-    assert check(nodes, 'def one(:\n    pass\n') == [(5, 'broken-module')]
+    assert check(nodes, 'def one(:\n    pass\n') == [(1, 'broken-module')]
 
 
 def test_a_behaviour_in_no_module_hides_no_unknown_parameter(check):

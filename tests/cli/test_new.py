@@ -50,6 +50,18 @@ def texts(project):
     }
 
 
+@pytest.mark.ros
+def test_each_command_of_the_readme_works(project, monkeypatch, capsys):
+    monkeypatch.chdir(project)
+    found = re.findall(r'(?:\$|`)[ ]?composer ([^`#\n>]*)', (project / 'README.md').read_text())
+    commands = [words.split() for words in found]
+    assert ['schema', '--scenarios'] in commands
+    for words in commands:
+        # A system runs until it is stopped; its check reads the same words.
+        given = ['check', *words[1:]] if words[0] == 'up' else words
+        assert given in (['check'], ['test']) or run(given) == 0, capsys.readouterr().err
+
+
 def run_in(project, *words):
     return subprocess.run(
         [sys.executable, '-m', *words],

@@ -162,7 +162,10 @@ UNUSABLE = {
     ('ROS_DOMAIN_ID', '300'): "ROS_DOMAIN_ID is a number from 0 to 232, not '300'",
     ('ROS_DOMAIN_ID', '\u0663'): "ROS_DOMAIN_ID is a number from 0 to 232, not '\u0663'",
     ('ROS_DOMAIN_ID', '9' * 5000): f"ROS_DOMAIN_ID is a number from 0 to 232, not '{'9' * 5000}'",
-    ('RMW_IMPLEMENTATION', 'rmw_none'): "no middleware 'rmw_none' is installed",
+    (
+        'RMW_IMPLEMENTATION',
+        'rmw_none',
+    ): "RMW_IMPLEMENTATION: no middleware 'rmw_none' is installed",
     ('RCUTILS_COLORIZED_OUTPUT', 'yes'): "RCUTILS_COLORIZED_OUTPUT is 0 or 1, not 'yes'",
     ('ROS_SECURITY_ENABLE', 'yes'): "ROS_SECURITY_ENABLE is true or false, not 'yes'",
     ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCAL'): (

@@ -7,7 +7,7 @@ import inspect
 import sys
 from typing import TYPE_CHECKING, Any, get_args
 
-from composer.diagnostics import Related
+from composer.diagnostics import Related, diagnostic_at
 from composer.inference.module_names import TopNames
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
@@ -79,16 +79,16 @@ def check_behaviour_call(
 def _explain_broken_module(
     context: CheckContext, binding: Binding, module: ModuleSource
 ) -> Diagnostic:
-    """Return one finding for all behaviours of a module, where the module is named first."""
+    """Return one finding for all behaviours of a module, at its error or where it is named."""
     behaviour = binding.behaviour
-    place = module.place_of(module.error_line) if module.error_line else None
+    reason = str(module.syntax_error).removeprefix(f'{module.path}:{module.error_line}: ')
+    message = f"the module '{behaviour.module}' is not valid Python: {reason}"
+    if module.error_line:
+        place = module.place_of(module.error_line)
+        related = [context.related_value(behaviour.path, f'{binding.owner} is bound to it here')]
+        return diagnostic_at(place, 'broken-module', message, related=related)
     return context.at_value(
-        behaviour.path,
-        'broken-module',
-        f"the module '{behaviour.module}' is not valid Python: {module.syntax_error}",
-        part=behaviour.module,
-        first=True,
-        related=[Related('the error is here', place)] if place else [],
+        behaviour.path, 'broken-module', message, part=behaviour.module, first=True
     )
 
 

@@ -12,6 +12,7 @@ from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.declared_packages import import_declared
 from composer.language.bindings import system_bindings
+from composer.python_source.modules import ModuleSource
 from composer.runtime.behaviours import callables as behaviours
 
 if TYPE_CHECKING:
@@ -132,6 +133,9 @@ def _explain(
 
 def _has_finding(context: CheckContext, binding: Binding, found: list[Diagnostic]) -> bool:
     """Return whether a behaviour or its arguments already have a finding."""
+    module = context.modules.find(binding.behaviour.module)
+    if isinstance(module, ModuleSource) and module.syntax_error is not None:
+        return True
     path = binding.behaviour.path
     place = context.system.positions.value(path)
     arguments = (*path[:-1], 'with')

@@ -64,7 +64,8 @@ def check_like(context: ScenarioContext, expected: LikeExpectationSpec) -> Itera
 def _conflict(
     context: ScenarioContext, path: DataPath, topic: str, recorded: str, known: str
 ) -> Diagnostic:
-    message = f"'{topic}' is a {recorded} in the recording, and a {known} in the system"
+    found = f'is a {recorded}' if recorded else 'has no type'
+    message = f"'{topic}' {found} in the recording, and is a {known} in the system"
     return context.at_value(path, 'conflicting-types', message)
 
 
