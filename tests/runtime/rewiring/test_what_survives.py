@@ -510,3 +510,74 @@ def test_calls_end_when_their_client_goes_and_only_then(edited):
     wait_for(lambda: len(edited.probe('caller')['answers']) == 2, 'the ends of both calls')
     (answer,) = set(edited.probe('caller')['answers'])
     assert answer == "an edit took the client of '/ask' away, which this call waited for"
+
+
+COUNTING = """
+import gc
+
+STEP = {step}
+
+
+def tick(node):
+    node.state.count = STEP
+    return str(STEP)
+
+
+def hear(node, message):
+    node.state.heard = message.data
+
+
+def count(node, request):
+    gc.collect()
+    return {{'success': True, 'message': str(len(gc.get_objects()))}}
+"""
+
+
+def test_reloads_leave_nothing_behind(compose, peer):
+    """Whatever is edited, as many objects are there afterwards: counted, not weighed."""
+
+    def write(step):
+        edited = {
+            'parameters': {'step': step},
+            'state': {'count': 0, 'heard': ''},
+            'publishers': {'out': 'std_msgs/msg/String'},
+            'timers': {
+                'tick': {'period': 0.05 + step / 100, 'behaviour': 'parts:tick', 'publish': 'out'}
+            },
+            'subscriptions': {
+                'out': {
+                    'type': 'std_msgs/msg/String',
+                    'behaviour': 'parts:hear',
+                    'qos': 5 + step,
+                }
+            },
+        }
+        counter = {
+            'services': {'count': {'type': 'std_srvs/srv/Trigger', 'behaviour': 'parts:count'}}
+        }
+        nodes = {'counter': counter, 'edited': edited} | ({'more': edited} if step else {})
+        text = json.dumps({'version': 1, 'diagnostics': False, 'nodes': nodes})
+        for name, content in (('parts.py', COUNTING.format(step=step)), ('system.yaml', text)):
+            beside = compose.folder / f'{name}.new'
+            beside.write_text(content)
+            beside.replace(compose.folder / name)
+
+    def reload(times):
+        for _ in range(times):
+            for step in (1, 0):
+                write(step)
+                assert peer.call(Trigger, '/_composer_system/reload').success
+
+    def count():
+        # What a reload or a call has just let go of goes with the next one.
+        return min(int(peer.call(Trigger, '/count').message) for _ in range(5))
+
+    write(0)
+    child = compose.run('system.yaml')
+    child.wait_until_ready()
+    reload(3)
+    before = count()
+    reload(15)
+    # One object that each of the 30 reloads leaves would be as many.
+    assert count() < before + 30, child.output
+    assert child.stop() == 0
