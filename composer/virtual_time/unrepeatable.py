@@ -205,7 +205,10 @@ class Watch:
         original = target.original
 
         def call(*arguments: Any, **keywords: Any) -> Any:
-            if self._threads.mine() is not None:
+            # Each callback asks for the number of its thread.
+            path = sys._getframe(1).f_code.co_filename  # noqa: SLF001 - the only way
+            is_own_business = path.startswith(_PACKAGE) and not path.startswith(_FOLDER)
+            if not is_own_business and self._threads.mine() is not None:
                 self.note(what, is_asked=True)
             return original(*arguments, **keywords)
 
