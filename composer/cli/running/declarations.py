@@ -103,7 +103,7 @@ def top_command(
     once: bool,
     each_period: bool,
 ) -> int:
-    """Show the health of each entity of SYSTEM, or of each node, in the last period.
+    """Show the health of each entity, or of each node, of SYSTEM.
 
     Calls in a second, callback times, the share of a processor, messages that wait in the queue;
     and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
