@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.application.running_systems.client import Client
 from composer.entity_kinds import KIND_OF_SECTION
-from composer.errors import ComposerError, UsageError
-from composer.language.nodl.writing import render_nodl, render_nodl_xml
+from composer.errors import ComposerError
 from composer.names import join_names
 from composer.ros_parameters.parameter_types import infer_parameter_type
 from composer.yaml_text.writer import render_yaml
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from composer.runtime.middleware.graph_capture import CapturedEnd, CapturedNode
     from composer.yaml_text.positions import DataPath
 
-FORMATS = ('yaml', 'nodl', 'nodl-xml')
 _ORDER = tuple(KIND_OF_SECTION)
 # Programs name these in full.
 _ABSOLUTE = ('/clock', '/diagnostics', '/diagnostics_agg', '/tf', '/tf_static')
@@ -27,19 +25,15 @@ _COMMAND = ['ros2', 'run', 'PACKAGE', 'EXECUTABLE']
 _ABOUT_COMMAND = 'which program this is, the ROS graph does not say'
 
 
-def capture(
-    nodes: Sequence[str], format_name: str, timeout_sec: float
-) -> tuple[str, list[CapturedNode]]:
+def capture(nodes: Sequence[str], timeout_sec: float) -> tuple[str, list[CapturedNode]]:
     """Return what nodes on the ROS graph have, as text, and the nodes.
 
     Args:
         nodes: Full names, or names in any namespace; all nodes if there are none.
-        format_name: One of `FORMATS`.
         timeout_sec: How long nodes may take to answer.
 
     Raises:
         ComposerError: There is no such node.
-        UsageError: Several nodes do not fit into the format.
     """
     with Client() as client:
         # It needs ROS, which the client has found.
@@ -53,29 +47,14 @@ def capture(
             msg = f'{message} ({domain})'
             raise ComposerError(msg, help=help_text) from error
         domain_id = client.domain_id
-    return _render(found, format_name, domain_id), list(found)
+    return _render(found, domain_id), found
 
 
-def _render(found: Sequence[CapturedNode], format_name: str, domain_id: int) -> str:
-    declared = [(each, _declare(each)) for each in found]
-    if format_name == 'nodl-xml':
-        return render_nodl_xml({each.name: data for each, data in declared})
-    if format_name == 'nodl':
-        if len(declared) > 1:
-            message = f'a NoDL document is for one node, and these are {len(declared)}'
-            names = ', '.join(each.full_name for each in found)
-            raise UsageError(message, help=f'name one of them, or use nodl-xml: {names}')
-        return render_nodl(declared[0][1])
-    return _render_processes(declared, domain_id)
-
-
-def _render_processes(
-    declared: Sequence[tuple[CapturedNode, dict[str, Any]]], domain_id: int
-) -> str:
-    often = Counter(node.name for node, _ in declared)
+def _render(nodes: Sequence[CapturedNode], domain_id: int) -> str:
+    often = Counter(node.name for node in nodes)
     processes: dict[str, Any] = {}
     remarks: dict[DataPath, str] = {}
-    for node, data in declared:
+    for node in nodes:
         key = node.name
         if often[key] > 1 or key in processes:
             key = node.full_name.strip('/').replace('/', '_')
@@ -83,7 +62,7 @@ def _render_processes(
             'command': _COMMAND,
             'name': node.name,
             'namespace': node.namespace,
-            'nodes': {node.name: data},
+            'nodes': {node.name: _declare(node)},
         }
         remarks['processes', key, 'command'] = _ABOUT_COMMAND
         if node.problem:

@@ -927,10 +927,10 @@ def packages_of_interfaces(folder):
 
 
 @case('bad-nodl')
-def nested_nodl(folder):
-    nodl = '<interface version="1"><node name="n" executable="e">' + '<x>' * (2_000_000 // DIVISOR)
-    write(folder, nodl, 'n.nodl.xml')
-    write(folder, f'{HEAD}processes: {{p: {{command: [sh], nodl: n.nodl.xml}}}}\n')
+def nodl_of_many_mistakes(folder):
+    parameters = (f'  p{index}: {{type: x}}\n' for index in range(20_000 // DIVISOR))
+    write(folder, f'nodl_version: 2\nparameters:\n{"".join(parameters)}', 'n.yaml')
+    write(folder, f'{HEAD}processes: {{p: {{command: [sh], nodl: n.yaml}}}}\n')
 
 
 @case()

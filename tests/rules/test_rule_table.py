@@ -36,7 +36,6 @@ SPEAKING_FILES = ('entity_kinds.py', 'runtime/behaviours/import_check.py')
 # Words of the same form that are no rules.
 NO_RULES = {
     'find-pkg-share',
-    'nodl-xml',
     'x-expected',
     'site-packages',
     'dist-packages',

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def capture(
-    nodes: Sequence[str], *, format_name: str, output: Path | None, timeout_sec: float
-) -> int:
+def capture(nodes: Sequence[str], *, output: Path | None, timeout_sec: float) -> int:
     """Write what nodes on the ROS graph have; return the exit code.
 
     It is 1 if a node does not answer: what it did not say is missing.
@@ -30,7 +28,7 @@ def capture(
     Raises:
         ComposerError: There is no such node, or the file cannot be written.
     """
-    text, found = captures.capture(nodes, format_name, timeout_sec)
+    text, found = captures.capture(nodes, timeout_sec)
     if output is None:
         click.echo(text, nl=False, color=False)
     else:

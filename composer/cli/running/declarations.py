@@ -204,9 +204,6 @@ def logs_command(asked: AskedSystem, *, follows: bool) -> int:
     metavar='FILE',
     help='The file to write. Default: standard output.',
 )
-@takes_format(
-    ['yaml', 'nodl', 'nodl-xml'], 'What to write: processes of a system, or a NoDL document.'
-)
 @click.option(
     '--timeout',
     'timeout_sec',
@@ -216,9 +213,7 @@ def logs_command(asked: AskedSystem, *, follows: bool) -> int:
     metavar='SEC',
     help='How long nodes may take to say which parameters they have.',
 )
-def capture_command(
-    nodes: tuple[str, ...], output: Path | None, format_name: str, timeout_sec: float
-) -> int:
+def capture_command(nodes: tuple[str, ...], output: Path | None, timeout_sec: float) -> int:
     """Write down what the nodes on this ROS graph have.
 
     Each NODE, or all nodes, with publishers, subscriptions, services, clients and actions, their
@@ -228,7 +223,7 @@ def capture_command(
     """
     from composer.cli.running.capture import capture
 
-    return capture(nodes, format_name=format_name, output=output, timeout_sec=timeout_sec)
+    return capture(nodes, output=output, timeout_sec=timeout_sec)
 
 
 COMMANDS = (

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import Diagnostic, SourceFile, diagnostic_at
+from composer.diagnostics import Diagnostic, diagnostic_at
 from composer.language.nodl.node_builder import RULE, NodlNode
-from composer.language.nodl.xml_documents import parse_xml
-from composer.language.nodl.yaml_documents import parse_yaml
+from composer.language.nodl.yaml_documents import is_xml, parse_nodl, refuse_xml
 from composer.language.paths import PathError, explain_absent, resolve_path
-from composer.spelling import suggest
-from composer.yaml_text.reader import decode_content, read_content
+from composer.yaml_text.reader import read_content
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.diagnostics import Span
     from composer.language.loaded_system import LoadedSystem
     from composer.yaml_text.positions import DataPath
+
+    _Merge = Callable[[dict[str, Any], NodlNode, DataPath], dict[str, Any]]
 
 _KEY = 'nodl'
 
@@ -54,53 +57,31 @@ class _Declaring:
         nodes = self._process.get('nodes')
         if isinstance(nodes, dict):
             self._process['nodes'] = {
-                name: self._with_document(name, node) if node and _KEY in node else node
+                name: self._with_document(node, ('nodes', name), self._merged)
                 for name, node in nodes.items()
             }
         if 'components' in self._process:
             self._process['components'] = {
-                name: self._with_ends(each, ('components', name)) if _KEY in each else each
-                for name, each in self._process['components'].items()
+                name: self._with_document(component, ('components', name), self._declaring)
+                for name, component in self._process['components'].items()
             }
         if _KEY in self._process:
-            text = self._process.pop(_KEY)
-            for node in self._choose(self._read(text, (*self._path, _KEY)), text):
+            node = self._read(self._process.pop(_KEY), (*self._path, _KEY))
+            if node is not None:
                 self._add(node)
         return self._process
 
-    def _with_document(self, name: str, node: dict[str, Any]) -> dict[str, Any]:
-        plain = dict(node)
-        path = (*self._path, 'nodes', name)
-        found = self._read(plain.pop(_KEY), (*path, _KEY))
-        last = name.rpartition('/')[2]
-        chosen = [each for each in found if each.name in (None, last)] or found
-        return self._merged(plain, chosen[0], path) if chosen else plain
-
-    def _with_ends(self, component: dict[str, Any], at: DataPath) -> dict[str, Any]:
-        plain = dict(component)
+    def _with_document(self, entry: Any, at: DataPath, merge: _Merge) -> Any:
+        """Return a node or component with what its document says, if it names one."""
+        if not entry or _KEY not in entry:
+            return entry
+        plain = dict(entry)
         path = (*self._path, *at)
-        found = self._read(plain.pop(_KEY), (*path, _KEY))
-        last = str(at[-1]).rpartition('/')[2]
-        chosen = [each for each in found if each.name in (None, last)] or found
-        return self._declaring(plain, chosen[0], path) if chosen else plain
-
-    def _choose(self, nodes: list[NodlNode], text: str) -> list[NodlNode]:
-        """Return the nodes of a document that are in the program of the process."""
-        wanted = self._process.get('executable')
-        command = map(str, self._process.get('command', ()))
-        words = [wanted] if wanted else [PurePath(word).name for word in command]
-        known = [each.executable for each in nodes if each.executable]
-        chosen = [each for each in nodes if each.executable in words]
-        if wanted and known and not chosen:
-            self._report(
-                (*self._path, _KEY),
-                f"'{PurePath(text).name}' has no node of the executable '{wanted}'",
-                suggest(wanted, known, 'it has those of'),
-            )
-        return chosen or ([] if wanted and known else nodes)
+        node = self._read(plain.pop(_KEY), (*path, _KEY))
+        return plain if node is None else merge(plain, node, path)
 
     def _add(self, node: NodlNode) -> None:
-        name = self._process.get('name', node.name)
+        name = self._process.get('name')
         if name is None:
             self._process = self._declaring(self._process, node, self._path)
             return
@@ -135,39 +116,31 @@ class _Declaring:
             merged[section] = {**entries, **merged.get(section, {})}
         return merged
 
-    def _read(self, text: str, at: DataPath) -> list[NodlNode]:
-        """Return the nodes of a document; what is wrong with it becomes findings."""
+    def _read(self, text: str, at: DataPath) -> NodlNode | None:
+        """Return the node of a document; what is wrong with it becomes findings."""
         if self._path in self._system.left_out:
-            return []
-        nodes, findings = self._read_file(text, at)
+            return None
+        node, findings = self._read_file(text, self._system.positions.value(at))
         self._system.diagnostics += findings
         if findings:
             # Of what it says, nobody knows what is missing.
             self._system.dropped.add(at)
-        return nodes
+        return node
 
-    def _read_file(self, text: str, at: DataPath) -> tuple[list[NodlNode], list[Diagnostic]]:
-        place = self._system.positions.value(at)
+    def _read_file(self, text: str, place: Span) -> tuple[NodlNode | None, list[Diagnostic]]:
         try:
             path = resolve_path(text, Path())
         except PathError as error:
             rule = 'uninstalled-package'
-            return [], [diagnostic_at(place, rule, str(error), help=error.help)]
+            return None, [diagnostic_at(place, rule, str(error), help=error.help)]
         self._system.named[path] = None
         content = read_content(path, str(path))
         if isinstance(content, Diagnostic):
             is_there = os.path.lexists(path)
             message = content.message if is_there else f"there is no NoDL document '{text}'"
             help_text = content.help if is_there else explain_absent(path, place)
-            return [], [diagnostic_at(place, RULE, message, help=help_text)]
-        if path.suffix in ('.yaml', '.yml', '.json') or not content.lstrip().startswith(b'<'):
-            return parse_yaml(content, str(path))
-        decoded = decode_content(content, str(path))
-        if isinstance(decoded, Diagnostic):
-            return [], [decoded]
-        return parse_xml(decoded, SourceFile(str(path), tuple(decoded.splitlines())))
-
-    def _report(self, at: DataPath, message: str, help_text: str | None) -> None:
-        place = self._system.positions.value(at)
-        self._system.diagnostics.append(diagnostic_at(place, RULE, message, help=help_text))
-        self._system.dropped.add(at)
+            return None, [diagnostic_at(place, RULE, message, help=help_text)]
+        if is_xml(path, content):
+            return None, [refuse_xml(place, text)]
+        node = parse_nodl(content, path)
+        return node, node.findings

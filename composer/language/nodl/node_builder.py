@@ -27,20 +27,14 @@ _NEEDS_NOBODY = ('subscriptions', 'service_clients', 'action_clients')
 
 @dataclass(slots=True)
 class NodlNode:
-    """A node of a document.
+    """The node of a document.
 
     Attributes:
-        name: `None` if the document has none.
-        executable: The program that it is for; `None` if the document does not say.
         data: Its sections, as in a declared node.
-        span: Where it begins.
-        findings: Those of the whole document, which all its nodes share.
+        findings: Those of the document and of all that it includes.
     """
 
-    name: str | None
-    executable: str | None
-    span: Span
-    findings: list[Diagnostic]
+    findings: list[Diagnostic] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
     keys: dict[DataPath, Span] = field(default_factory=dict)
     values: dict[DataPath, Span] = field(default_factory=dict)
@@ -81,8 +75,7 @@ class NodlNode:
         known = f'{_OTHER_NAMES.get(scalar, scalar)}{separator}'
         if known not in PARAMETER_TYPES:
             help_text = suggest(type_name, PARAMETER_TYPES, 'the types are')
-            message = f"'{type_name}' is not a type of parameters"
-            self.findings.append(diagnostic_at(spans[1], RULE, message, help=help_text))
+            self.report(spans[1], f"'{type_name}' is not a type of parameters", help_text)
             return
         self.data.setdefault('parameters', {})[name] = {'type': known, **declared}
         path = ('parameters', name)

@@ -1,4 +1,4 @@
-"""NoDL in YAML or JSON, version 2: what one node has, with QoS.
+"""NoDL documents of version 2, in YAML or JSON: the ends of a node with QoS, and its parameters.
 
 Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl
 """
@@ -6,22 +6,24 @@ Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl
 from __future__ import annotations
 
 import os
-from pathlib import Path
+import re
 from typing import TYPE_CHECKING, Any
 
 from composer.ament import ament_prefixes, find_path
-from composer.diagnostics import Span
-from composer.language.nodl.node_builder import NodlNode
+from composer.diagnostics import Diagnostic, diagnostic_at
+from composer.language.nodl.node_builder import RULE, NodlNode
 from composer.language.qos import NANOSECONDS
 from composer.spelling import suggest
-from composer.yaml_text.reader import parse_document, read_document
+from composer.yaml_text.reader import parse_document, read_content
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic
+    from pathlib import Path
+
+    from composer.diagnostics import Span
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath
 
-SECTIONS = {
+_SECTIONS = {
     'publishers': 'publishers',
     'subscriptions': 'subscriptions',
     'service_servers': 'services',
@@ -29,22 +31,36 @@ SECTIONS = {
     'action_servers': 'actions',
     'action_clients': 'action_clients',
 }
-_KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *SECTIONS)
+_KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *_SECTIONS)
 _POLICIES = ('history', 'depth', 'reliability', 'durability', 'liveliness')
-DURATION_KEYS = ('deadline', 'lifespan', 'liveliness_lease_duration')
+_DURATION_KEYS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 _SCALARS = ('int', 'double', 'string')
 # Of a parameter for each of several things, whose names another parameter has.
 _MAPPED = '__map_'
 _MOST_INCLUDED = 100
+_XML = re.compile(rb'(?:\xef\xbb\xbf)?\s*<[?!\w]')
 
 
-def parse_yaml(content: bytes, name: str) -> tuple[list[NodlNode], list[Diagnostic]]:
-    """Return the node of a document, and what is wrong with it."""
-    findings: list[Diagnostic] = []
-    document = parse_document(content, name)
-    node = NodlNode(None, None, Span(document.positions.source, 1, 1, 0), findings)
-    _Reader(node).read(document, Path(name), [Path(name)])
-    return [node], findings
+def is_xml(path: Path, content: bytes) -> bool:
+    """Return whether a document is of version 1, which is XML."""
+    return path.suffix == '.xml' or _XML.match(content) is not None
+
+
+def refuse_xml(place: Span, text: str) -> Diagnostic:
+    """Return the finding about a document of version 1."""
+    return diagnostic_at(
+        place,
+        RULE,
+        f"'{text}' is NoDL of version 1 (XML), and only version 2 (YAML) is read",
+        help="write it in YAML, with 'nodl_version: 2' at its top, and name that file",
+    )
+
+
+def parse_nodl(content: bytes, path: Path) -> NodlNode:
+    """Return the node of a document, with what is wrong with it."""
+    node = NodlNode()
+    _Reader(node).read(parse_document(content, str(path)), path, [path])
+    return node
 
 
 class _Reader:
@@ -66,7 +82,7 @@ class _Reader:
             if key not in _KEYS:
                 help_text = suggest(key, _KEYS, 'the keys are')
                 self._node.report(positions.key((key,)), f"NoDL has no key '{key}'", help_text)
-        for key, section in SECTIONS.items():
+        for key, section in _SECTIONS.items():
             for index, end in enumerate(_list(data.get(key))):
                 self._add_end(document, section, end, (key, index))
         self._add_parameters(document)
@@ -98,14 +114,17 @@ class _Reader:
                 policies[key] = value.lower()
             elif key == 'depth' and type(value) is int and value > 0:
                 policies[key] = value
-            elif key != name and name in DURATION_KEYS and type(value) is int and value >= 0:
+            elif key != name and name in _DURATION_KEYS and type(value) is int and value >= 0:
                 # 0 is no limit.
                 policies |= {name: value / NANOSECONDS} if value else {}
             else:
-                place = document.positions.value((*at, key))
-                known = [*_POLICIES, *(f'{each}_ns' for each in DURATION_KEYS)]
-                help_text = None if key in known else suggest(key, known, 'the policies are')
-                self._node.report(place, f"'{key}: {value}' is no QoS of NoDL", help_text)
+                known = [*_POLICIES, *(f'{policy}_ns' for policy in _DURATION_KEYS)]
+                message, path = f"'{key}: {value}' is no QoS of NoDL", (*at, key)
+                if key in known:
+                    self._node.report(document.positions.value(path), message)
+                else:
+                    help_text = suggest(key, known, 'the policies are')
+                    self._node.report(document.positions.key(path), message, help_text)
         return policies
 
     def _add_parameters(self, document: Document) -> None:
@@ -139,7 +158,13 @@ class _Reader:
         elif found in stack:
             self._node.report(place, f"'{text}' includes itself")
         elif self._included <= _MOST_INCLUDED:
-            self.read(read_document(found), found, [*stack, found])
+            content = read_content(found, str(found))
+            if isinstance(content, Diagnostic):
+                self._node.findings.append(content)
+            elif is_xml(found, content):
+                self._node.findings.append(refuse_xml(place, str(text)))
+            else:
+                self.read(parse_document(content, str(found)), found, [*stack, found])
 
 
 def _find_document(text: str, folder: Path) -> Path | None:

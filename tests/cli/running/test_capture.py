@@ -90,25 +90,6 @@ def test_what_is_captured_is_checked_beside_nodes_of_a_system(run, tmp_path):
     assert '_action' not in text
 
 
-def test_a_nodl_document_of_a_node_says_the_same(run, tmp_path):
-    result = run(['camera'], 'camera', '--format', 'nodl', '-o', 'camera.nodl.yaml')
-    assert (result.returncode, result.stderr) == (0, '')
-    xml = run([], '/left/camera', '--format', 'nodl-xml', '-o', 'camera.nodl.xml')
-    assert (xml.returncode, xml.stderr) == (0, '')
-    path = tmp_path / 'robot.yaml'
-    named = "{command: ['true'], name: camera, namespace: /left, nodl: camera.nodl."
-    for suffix in ('yaml', 'xml'):
-        system = f'version: 1\nprocesses:\n  camera: {named}{suffix}}}\n{BESIDE}'
-        assert not check(
-            path,
-            system.replace('std_msgs/msg/String', '{type: std_msgs/msg/String, external: true}'),
-        )
-        wrong = system.replace(
-            'type: sensor_msgs/msg/Image, topic', 'type: std_msgs/msg/Int8, topic'
-        )
-        assert 'conflicting-types' in [each.rule for each in check(path, wrong)]
-
-
 def test_nodes_of_one_name_and_nodes_that_do_not_answer_are_told_apart(run, tmp_path):
     result = run(['camera', 'right_camera', 'silent', 'hung'], '--timeout', '2', '-o', 'all.yaml')
     assert result.returncode == 1
