@@ -281,3 +281,12 @@ def test_the_host_of_a_discovery_server_has_a_part(export, project):
     inventory = 'network: {discovery: discovery_server, server: tower}\n'
     units = units_of(export('systemd', project(FLEET + inventory)))
     assert 'composer-robot@tower.service' in units
+
+
+def test_the_project_alone_is_mounted(export, project, tmp_path_factory):
+    """A program elsewhere is yours to add: its folder and the project's are in many others."""
+    program = tmp_path_factory.mktemp('elsewhere') / 'driver'
+    program.write_text('#!/bin/sh\n')
+    file = project(f'version: 1\nprocesses:\n  driver: {{command: [{program}]}}\n')
+    (service,) = yaml.safe_load(export('compose', file))['services'].values()
+    assert [each['source'] for each in service['volumes']] == [str(file.parents[1])]

@@ -109,9 +109,12 @@ def _describe(  # noqa: PLR0913 - as above
 ) -> Export:
     spec, read = context.spec, choose_read(names)
     check_words(words, read)
-    files = list_project_files(spec, [*paths, *list_files(context)])
+    named = [path.absolute() for path in (*paths, *list_files(context))]
+    files = list_project_files(spec, named)
     stays_here, folder = form == _STAYS_HERE, Path.cwd()
-    root = Path('/') if stays_here else find_root(files)
+    # A program of a process that lies elsewhere is no reason to mount the folder of both.
+    root = Path('/') if stays_here else find_root(set(named).intersection(files) or files)
+    files = [path for path in files if path.is_relative_to(root)]
     return Export(
         form=form,
         name=spec.name,
