@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import KIND_OF_SECTION
 from composer.input_limits import MAX_FINDINGS
-from composer.records import record
 from composer.schema import SCHEMA_NAME, schema_path
-from composer.schema.compiler import Check, SchemaCompiler
 from composer.schema.explanations import explain
+from composer.schema.validator import SchemaValidator
 from composer.yaml_text.document import copy_data
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def check_structure(document: Document) -> None:
     """
     positions, data = document.positions, document.data or {}
     failed = [_entry_of(path) for path in document.dropped]
-    if not failed and _schema().is_valid(data):
+    if not failed and _schema().is_surely_valid(data):
         document.data, document.dropped = data, set()
         return
     data = copy_data(data)
@@ -132,7 +131,7 @@ def _is_known(place: tuple[str, str]) -> bool:
 @cache
 def known_keys(definition: str) -> frozenset[str]:
     """Return the keys that a definition of the schema knows; those of a file for `''`."""
-    document = _schema().document
+    document = _schema().schema
     schema = document['$defs'][definition] if definition else document
     branches = (schema, *schema.get('oneOf', ()))
     return frozenset(key for branch in branches for key in branch.get('properties', ()))
@@ -226,10 +225,11 @@ def without_templates(schema: Any) -> Any:
 
 def _find_violations(data: dict[str, Any], schema: str = SCHEMA_NAME) -> list[Violation]:
     """Return the violations, a thousand at most."""
-    if _schema(schema).is_valid(data):
+    validator = _schema(schema)
+    if validator.is_surely_valid(data):
         return []
-    errors = _validator(schema).iter_errors(data)
-    violations = (each for error in errors for each in explain(error))
+    errors = validator.iter_errors(data)
+    violations = (violation for error in errors for violation in explain(error))
     return list(islice(violations, MAX_FINDINGS))
 
 
@@ -267,23 +267,7 @@ def _child(data: Any, key: Key) -> Any:
     return data[key] if is_item else None
 
 
-@record
-class _Schema:
-    document: dict[str, Any]
-    compiler: SchemaCompiler
-    is_valid: Check
-
-
 @cache
-def _schema(name: str = SCHEMA_NAME) -> _Schema:
-    document = without_templates(json.loads(schema_path(name).read_text(encoding='utf-8')))
-    compiler = SchemaCompiler(document['$defs'])
-    return _Schema(document, compiler, compiler.compile(document))
-
-
-@cache
-def _validator(name: str) -> Any:
-    # Importing it takes a fifth of a check's time, and most files are valid.
-    from composer.schema.validator import create_validator
-
-    return create_validator(_schema(name).document, _schema(name).compiler)
+def _schema(name: str = SCHEMA_NAME) -> SchemaValidator:
+    text = schema_path(name).read_text(encoding='utf-8')
+    return SchemaValidator(without_templates(json.loads(text)))

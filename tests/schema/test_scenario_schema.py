@@ -13,8 +13,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
 from composer.schema import SCENARIO_SCHEMA_NAME, schema_path
-from composer.schema.compiler import SchemaCompiler
-from composer.schema.validator import create_validator
+from composer.schema.validator import SchemaValidator
 
 SCHEMA = json.loads(schema_path(SCENARIO_SCHEMA_NAME).read_text())
 CATALOGUE = InterfaceCatalogue()
@@ -131,11 +130,10 @@ def composer_accepts(data, path):
     return not without_end
 
 
-def test_an_editor_composer_and_the_compiled_schema_have_the_same_verdict(tmp_path):
+def test_an_editor_composer_and_the_validator_have_the_same_verdict(tmp_path):
     (tmp_path / 'a.yaml').write_text('version: 1\nargs: {a: 1}\nnodes: {a: {}}\n')
     (tmp_path / 'b.yaml').write_text('nodes: {a: {}}\n')
-    compiler = SchemaCompiler(SCHEMA['$defs'])
-    compiled = compiler.compile(SCHEMA)
+    validator = SchemaValidator(SCHEMA)
     verdicts = []
 
     def problems(validator, data):
@@ -148,8 +146,8 @@ def test_an_editor_composer_and_the_compiled_schema_have_the_same_verdict(tmp_pa
     def agree(data):
         verdict = EDITOR.is_valid(data)
         assert composer_accepts(data, tmp_path / 'x.scenario.yaml') == verdict
-        assert compiled(data) == verdict
-        assert problems(create_validator(SCHEMA, compiler), data) == problems(EDITOR, data)
+        assert verdict or not validator.is_surely_valid(data)
+        assert problems(validator, data) == problems(EDITOR, data)
         verdicts.append(verdict)
 
     agree()

@@ -4,22 +4,29 @@ import itertools
 import json
 import math
 import random
-import re
+import sys
+from functools import reduce
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
+import composer
 from composer.language.pipeline import load_system_text
-from composer.schema import schema_path
-from composer.schema.compiler import SchemaCompiler
+from composer.schema import schema_path, structure
 from composer.schema.structure import without_templates
-from composer.schema.validator import create_validator
+from composer.schema.validator import SchemaValidator
 
 SCHEMA = json.loads(schema_path().read_text())
 EDITOR = Draft202012Validator(SCHEMA)
 PLAIN = without_templates(SCHEMA)
+QUICK = SchemaValidator(PLAIN)
+with pytest.MonkeyPatch.context() as patched:
+    patched.setitem(sys.modules, 'jsonschema_rs', None)
+    ALONE = SchemaValidator(PLAIN)
+DEEP = reduce(lambda inner, _: [inner], range(900), 0)
 NAMES = st.sampled_from(['a', 'b', 'left_wheel', 'x-note', 'type', 'nodes', 'ä', ''])
 NUMBERS = st.one_of(
     st.integers(-2, 12),
@@ -131,22 +138,20 @@ def composer_accepts(data):
 
 
 def check_agreement(data):
-    """Hold Composer, an editor and the compiled schema against each other; return the verdict."""
+    """Hold Composer, an editor and both validators against each other; return the verdict."""
     accepted = composer_accepts(data)
     assume(accepted is not None)
     verdict = EDITOR.is_valid(data)
     assert accepted == verdict
-    compiler = SchemaCompiler(PLAIN['$defs'])
-    validator = Draft202012Validator(PLAIN)
-    assert compiler.compile(PLAIN)(data) == validator.is_valid(data)
+    errors = {problem_of(error) for error in Draft202012Validator(PLAIN).iter_errors(data)}
+    assert not (errors and QUICK.is_surely_valid(data))
     # With what is right passed over, the same findings come out.
-    assert {problem_of(each) for each in create_validator(PLAIN, compiler).iter_errors(data)} == {
-        problem_of(each) for each in validator.iter_errors(data)
-    }
+    for validator in (QUICK, ALONE):
+        assert {problem_of(error) for error in validator.iter_errors(data)} == errors
     return verdict
 
 
-def test_an_editor_composer_and_the_compiled_schema_have_the_same_verdict():
+def test_an_editor_composer_and_both_validators_have_the_same_verdict():
     verdicts = []
 
     @settings(
@@ -201,25 +206,53 @@ def test_every_choice_of_keys_has_one_verdict(kind):
     assert verdicts == {True, False}
 
 
-@pytest.mark.parametrize('number', [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize('key', ['period', 'rate'])
-def test_no_period_is_endless(key, number):
-    compiler = SchemaCompiler(PLAIN['$defs'])
-    timer = {key: number, 'behaviour': 'a:b'}
-    assert not compiler.compile_reference('#/$defs/timer')(timer)
+@pytest.mark.parametrize('validator', [QUICK, ALONE], ids=['quick', 'alone'])
+@pytest.mark.parametrize(
+    ('node', 'is_valid'),
+    [
+        *(({'timers': {'t': {key: number, 'behaviour': 'a:b'}}}, False)
+          for key in ('period', 'rate') for number in (math.nan, math.inf, -math.inf)),
+        ({'warn_after': None}, True),
+        ({'warn_after': math.nan}, False),
+        ({'warn_after': math.inf}, False),
+        ({'warn_after': True}, False),
+        ({'parameters': {'p': math.nan}}, True),
+        ({'timers': {'t': {'period': 1, 'behaviour': 'ä:ö'}}}, True),
+        ({'timers': {'t': {'period': 1, 'behaviour': 'a:b', 'with': {'deep': DEEP}}}}, True),
+        ({'timers': {'t': {'period': 1, 'behaviour': 'a:b', 'with': {'key': {1: 2}}}}}, True),
+    ],
+)  # fmt: skip
+def test_what_json_does_not_have_has_one_verdict(validator, node, is_valid):
+    data = {'version': 1, 'nodes': {'n': node}}
+    assert is_valid == (not [*validator.iter_errors(data)])
+    assert is_valid or not validator.is_surely_valid(data)
 
 
-def test_a_keyword_that_the_compiler_does_not_know_is_refused():
-    with pytest.raises(
-        ValueError, match=re.escape("the schema compiler does not know the keywords ['maxLength']")
-    ):
-        SchemaCompiler({}).compile({'type': 'string', 'maxLength': 3})
+@pytest.mark.parametrize('validator', [QUICK, ALONE], ids=['quick', 'alone'])
+@pytest.mark.parametrize('name', ['', ' ', '\x1c', '\x85', '\xa0', '\u3000'])
+def test_names_of_white_space_are_empty(validator, name):
+    data = {'version': 1, 'nodes': {}, 'qos': {name: {'depth': 1}}}
+    assert not validator.is_surely_valid(data)
+    assert [error.validator for error in validator.iter_errors(data)] == ['pattern']
 
 
-def test_values_that_equal_each_other_in_python_are_not_the_same():
-    compile_check = SchemaCompiler({}).compile
-    assert compile_check({'const': 1})(1.0)
-    assert not compile_check({'const': 1})(True)
-    assert not compile_check({'enum': [True]})(1)
-    assert not compile_check({'type': 'integer'})(True)
-    assert compile_check({'type': 'integer'})(2.0)
+def test_findings_are_the_same_without_jsonschema_rs(monkeypatch):
+    files = sorted(Path(composer.__file__).parent.glob('rules/*/bad.yaml'))
+
+    def find_all():
+        structure._schema.cache_clear()
+        texts = [file.read_text(errors='replace') for file in files]
+        return [
+            [(finding.sort_key, finding.help) for finding in load_system_text(text).diagnostics]
+            for text in texts
+        ]
+
+    quick = find_all()
+    assert structure._schema().is_surely_valid({'version': 1, 'nodes': {}})
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, 'jsonschema_rs', None)
+        alone = find_all()
+        assert not structure._schema().is_surely_valid({'version': 1, 'nodes': {}})
+    structure._schema.cache_clear()
+    assert alone == quick
+    assert sum(map(len, quick)) > len(files) / 4
