@@ -10,7 +10,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
-from composer.export.documents import render_document
+from composer.export.documents import literal, render_document
 from composer.export.images import PROJECT, render_dockerfile
 from composer.export.parts import keep_apart
 
@@ -62,7 +62,7 @@ def service_name(text: str) -> str:
 
 def _build(export: Export) -> dict[str, Any]:
     text = render_dockerfile(export.root, has_interfaces=export.has_interfaces)
-    return {'context': _literal(export.source), 'dockerfile_inline': _literal(text)}
+    return {'context': literal(export.source), 'dockerfile_inline': literal(text)}
 
 
 def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> dict[str, Any]:
@@ -70,12 +70,12 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
     words = ['composer', *export.arguments(part, PROJECT)]
     # Docker would take an image without a tag for one of its own registry.
     name = f'composer-{project_name(export.name)}:latest'
-    service: dict[str, Any] = {'image': _literal(export.image or name)}
+    service: dict[str, Any] = {'image': literal(export.image or name)}
     service |= {'build': build} if build else {}
     service |= {'profiles': [service_name(part.host)]} if part.host else {}
     return service | {
-        'command': [_literal(each) for each in words],
-        'working_dir': _literal(str(inner)),
+        'command': [literal(each) for each in words],
+        'working_dir': literal(str(inner)),
         'init': True,
         'network_mode': 'host',
         'ipc': 'host',
@@ -84,13 +84,13 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
         'volumes': [
             {
                 'type': 'bind',
-                'source': _literal(export.source),
+                'source': literal(export.source),
                 'target': str(PROJECT),
                 'read_only': True,
             }
         ],
         'healthcheck': {
-            'test': ['CMD', 'composer', 'ps', _literal(part.name)],
+            'test': ['CMD', 'composer', 'ps', literal(part.name)],
             'interval': '30s',
             'timeout': '20s',
             'start_period': '60s',
@@ -101,15 +101,10 @@ def _service(export: Export, part: HostPart, build: dict[str, Any] | None) -> di
 
 
 def _environment(export: Export, part: HostPart) -> dict[str, Any]:
-    entries = [_literal(f'{name}={value}') for name, value in sorted(part.variables.items())]
+    entries = [literal(f'{name}={value}') for name, value in sorted(part.variables.items())]
     for name, must_be_set in export.read.items():
         # Values of the environment stand in no file: Compose takes them from its own.
         advice = 'set it in the environment, or in a file .env beside this one'
         is_required = must_be_set and _VARIABLE.fullmatch(name)
-        entries.append(f'{name}=${{{name}?{advice}}}' if is_required else _literal(name))
+        entries.append(f'{name}=${{{name}?{advice}}}' if is_required else literal(name))
     return {'environment': entries} if entries else {}
-
-
-def _literal(text: str) -> str:
-    """Return a text in which Compose replaces no variables."""
-    return text.replace('$', '$$')

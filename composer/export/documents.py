@@ -49,6 +49,11 @@ def render_document(data: Mapping[str, Any], remarks: Mapping[str, str] | None =
     return ''.join(_remarked(line, left) for line in text.splitlines(keepends=True))
 
 
+def literal(text: str) -> str:
+    """Return a text in which Compose and Kubernetes replace no variables."""
+    return text.replace('$', '$$')
+
+
 def _remarked(line: str, left: dict[str, str]) -> str:
     found = _KEY.match(line)
     remark = found and left.pop(found[2], None)

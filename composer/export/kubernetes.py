@@ -13,7 +13,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, UsageError
-from composer.export.documents import render_document
+from composer.export.documents import literal, render_document
 from composer.export.images import PROJECT
 from composer.export.parts import keep_apart
 from composer.input_limits import read_file
@@ -52,7 +52,7 @@ def render_files(export: Export) -> dict[str, str]:
 
     Raises:
         UsageError: There is no image.
-        ComposerError: The files are too large, or two hosts have almost the same name.
+        ComposerError: The files are too large.
     """
     if not export.image:
         message = 'Kubernetes runs images, and none is given'
@@ -60,38 +60,15 @@ def render_files(export: Export) -> dict[str, str]:
         raise UsageError(message, help=advice)
     files = _config_map(export)
     checksum = hashlib.sha256(repr(files).encode()).hexdigest()[:16]
-    names = [_name_part(part) for part in export.parts]
-    for name in names:
-        if names.count(name) > 1:
-            message = f"two hosts have the same name for Kubernetes: '{name}'"
-            raise ComposerError(message)
-    workloads = [
-        _workload(export, part, name, files, checksum)
-        for part, name in zip(export.parts, names, strict=True)
-    ]
-    first, *others = (render_document(each, _REMARKS) for each in workloads)
-    return {FILE: '---\n'.join([render_document(files), first, *others])}
+    workloads = [_workload(export, part, files, checksum) for part in export.parts]
+    documents = [render_document(workload, _REMARKS) for workload in workloads]
+    return {FILE: '---\n'.join([render_document(files), *documents])}
 
 
-def object_name(system: str) -> str:
-    """Return a name that Kubernetes takes for objects of a system.
-
-    That of another system is another one.
-    """
-    return keep_apart(system, _as_label(system))
-
-
-def _name_part(part: HostPart) -> str:
-    name = object_name(part.system)
-    whole = f'{name}-{part.host}' if part.host else name
-    return (
-        _as_label(whole) if len(whole) <= _LONGEST_LABEL else keep_apart(whole, _as_label(whole))
-    )
-
-
-def _as_label(text: str) -> str:
-    """Return a text as a label of DNS, to which a digest may be added."""
-    return _NO_NAME.sub('-', text.lower())[:_LONGEST_LABEL].strip('-') or 'system'
+def _object_name(text: str) -> str:
+    """Return a name that Kubernetes takes for objects: a label of DNS, another for each text."""
+    label = _NO_NAME.sub('-', text.lower())[:_LONGEST_LABEL].strip('-') or 'system'
+    return keep_apart(text, label)
 
 
 def _config_map(export: Export) -> dict[str, Any]:
@@ -110,7 +87,7 @@ def _config_map(export: Export) -> dict[str, Any]:
     return {
         'apiVersion': 'v1',
         'kind': 'ConfigMap',
-        'metadata': _metadata(export, object_name(export.name)),
+        'metadata': _metadata(export, _object_name(export.name)),
         'data': texts,
         **({'binaryData': others} if others else {}),
     }
@@ -132,15 +109,16 @@ def _keys(export: Export) -> dict[str, Path]:
 
 def _metadata(export: Export, name: str) -> dict[str, Any]:
     labels = {
-        'app.kubernetes.io/name': object_name(export.name),
+        'app.kubernetes.io/name': _object_name(export.name),
         'app.kubernetes.io/managed-by': 'composer',
     }
     return {'name': name, 'labels': labels}
 
 
 def _workload(
-    export: Export, part: HostPart, name: str, files: dict[str, Any], checksum: str
+    export: Export, part: HostPart, files: dict[str, Any], checksum: str
 ) -> dict[str, Any]:
+    name = _object_name('-'.join(filter(None, (part.system, part.host))))
     labels = {'app.kubernetes.io/instance': name}
     selector = {'nodeSelector': {_HOST: part.host}} if part.host else {}
     items = [
@@ -194,7 +172,7 @@ def _container(export: Export, part: HostPart) -> dict[str, Any]:
     return {
         'name': 'composer',
         'image': export.image,
-        'args': [_literal(each) for each in ('composer', *words)],
+        'args': [literal(each) for each in ('composer', *words)],
         'workingDir': str(inner),
         'env': [*_environment(export, part)],
         **_probes(part),
@@ -222,7 +200,7 @@ def _probes(part: HostPart) -> dict[str, Any]:
     if not part.answers_alone:
         # It must not be killed because the host of the discovery server is away.
         return {}
-    probe = {'exec': {'command': ['composer', 'ps', _literal(part.name)]}, 'timeoutSeconds': 20}
+    probe = {'exec': {'command': ['composer', 'ps', literal(part.name)]}, 'timeoutSeconds': 20}
     return {
         'startupProbe': {**probe, 'periodSeconds': 10, 'failureThreshold': 60},
         'livenessProbe': {**probe, 'periodSeconds': 30, 'failureThreshold': 3},
@@ -233,14 +211,9 @@ def _environment(export: Export, part: HostPart) -> list[dict[str, Any]]:
     # The root file system cannot be written.
     variables = {**part.variables, 'HOME': '/tmp'}  # noqa: S108 - of the container
     entries: list[dict[str, Any]] = [
-        {'name': name, 'value': _literal(value)} for name, value in sorted(variables.items())
+        {'name': name, 'value': literal(value)} for name, value in sorted(variables.items())
     ]
     for name, must_be_set in export.read.items():
-        key = {'name': object_name(export.name), 'key': name, 'optional': not must_be_set}
+        key = {'name': _object_name(export.name), 'key': name, 'optional': not must_be_set}
         entries.append({'name': name, 'valueFrom': {'secretKeyRef': key}})
     return entries
-
-
-def _literal(text: str) -> str:
-    """Return a text in which Kubernetes replaces no variables."""
-    return text.replace('$', '$$')

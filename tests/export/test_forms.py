@@ -166,6 +166,14 @@ def test_two_systems_never_have_one_name(export, project):
     assert 'a-b' in projects
 
 
+def test_hosts_of_almost_one_name_are_apart(export, project):
+    file = project(FLEET.replace('host: jetson', 'host: Base'), 'my_Robot')
+    _files, *workloads = check_kubernetes(export('kubernetes', file))
+    names = [workload['metadata']['name'] for workload in workloads]
+    assert len({*names}) == 2
+    assert all(name.startswith('my-robot-base-') for name in names)
+
+
 def test_a_part_that_nobody_runs_is_an_error(export, project):
     text = FLEET.replace('defaults: {host: base}\n', '')
     told = export('systemd', project(text), fails=True)
