@@ -52,7 +52,6 @@ SHARED_NAMES = {
     '__init__.py',
     'declarations.py',  # of commands
     'check.py',  # what is wrong, and the command that shows it
-    'capture.py',  # what is on the ROS graph, and the command that writes it
     'environment.py',  # variables, and their checks
     'differences.py',  # between definitions, and between systems
     'names.py',  # the rules for names, and their checks

@@ -42,7 +42,7 @@ _BEST_AVAILABLE = {
     'liveliness_lease_duration': LivelinessLeaseDurationeBestAvailable,
 }
 # Longer durations are no limit: `Infinite`, and what is left to the middleware.
-_LONGEST_NS = 2**62
+_LONGEST_NS = (2**31 - 1) * NANOSECONDS
 
 
 def create_qos_profile(spec: QosSpec, profiles: Mapping[str, QosSpec]) -> QoSProfile:
