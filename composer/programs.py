@@ -106,3 +106,10 @@ def _programs(search_path: str) -> frozenset[str]:
         with suppress(OSError):
             found.update(os.listdir(folder or '.'))  # noqa: PTH208 - names alone are needed
     return frozenset(found)
+
+
+def own_command() -> list[str]:
+    """Return the command by which this process was started, without its arguments."""
+    count = len(sys.argv) - 1
+    options = sys.orig_argv[1 : len(sys.orig_argv) - count]
+    return [sys.executable, *options]

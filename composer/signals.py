@@ -80,11 +80,6 @@ def _handle(number: int, _frame: FrameType | None) -> None:
     os.kill(os.getpid(), number)
 
 
-def heed_at_exit() -> None:
-    """Have the process not ignore signals when the other `atexit` functions have run."""
-    atexit.unregister(_ignore_signals)
-
-
 def _ignore_signals() -> None:
     for number in previous:
         signal.signal(number, signal.SIG_IGN)

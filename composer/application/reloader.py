@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.application.rehearsal import rehearse
 from composer.application.system_reader import import_reading, list_files
 from composer.application.told_findings import ToldFindings, with_findings
 from composer.application.watched_files import WatchedFiles
@@ -25,7 +24,7 @@ from composer.interfaces.search_paths import extend_variables
 from composer.planning.differences import compare, find_new_start
 from composer.planning.snapshot_data import conceal_snapshot
 from composer.planning.snapshot_taking import take_snapshot
-from composer.planning.text import STARTS_AGAIN, render_plan
+from composer.planning.text import NEEDS_RESTART, render_plan
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.health.system_state import Outcome
 
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from composer.application.system_reader import SystemReader
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.planning.plan import Operation, Plan
+    from composer.planning.plan import Plan
     from composer.planning.snapshot import Snapshot
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.system import System
@@ -136,8 +135,6 @@ class Reloader:
         if plan:
             text = f'reloaded in {took_sec * 1000:.0f} ms: {plan.summarize()}'
             text += plan.describe_rebuilt()
-        if system.starts_again:
-            text = f'{STARTS_AGAIN}: {plan.summarize()}'
         if plan or not was_good:
             system_logger.info(text)
         system.state.note_reload(Outcome(succeeded=True, text=text))
@@ -190,10 +187,11 @@ class Reloader:
         snapshot = take_snapshot(context, self._prefixes)
         self._files.also_follow(list_files(context))
         if cause := find_new_start(system.snapshot, snapshot):
-            self._start_again(system, cause, is_whole)
-            return compare(system.snapshot, snapshot)
+            keys = ' and '.join(sorted({change.key for change in cause.changes}))
+            message = f'{keys} cannot change while the system runs: {cause.reason}; '
+            raise ComposerError(message + NEEDS_RESTART)
         if snapshot.definitions != system.snapshot.definitions:
-            self._add_packages(system, context)
+            self._add_packages(context)
             snapshot = take_snapshot(context, self._prefixes)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
@@ -226,33 +224,8 @@ class Reloader:
         self._files.follow([*self._paths, *list_files(context)])
         return plan
 
-    def _start_again(self, system: System, cause: Operation, is_whole: Callable[[], bool]) -> None:
-        """Have the whole system start again, if it can."""
-        from composer.runtime.logs import system_logger
-
-        changes = ' and '.join(sorted({each.key for each in cause.changes}))
-        if not system.can_start_again:
-            message = f'{changes} cannot change while the system runs: {cause.reason}'
-            raise ComposerError(
-                message, help='end the program that it runs in, and start that again'
-            )
-        if not is_whole():
-            raise _HalfWrittenError
-        system_logger.info(
-            f'reload: the system must start again, because of {changes}; rehearsing'
-        )
-        rehearse(system, self._is_outdated)
-        if not is_whole():
-            raise _HalfWrittenError
-        system.start_again(self._aborts_goals.is_set, self._is_outdated)
-        if not system.starts_again:
-            raise ComposerError(_STOPS)
-
-    def _add_packages(self, system: System, context: CheckContext) -> None:
+    def _add_packages(self, context: CheckContext) -> None:
         """Build and import the interface packages that were not declared before."""
-        if system.can_start_again:
-            # Another process can be ended whatever it does.
-            rehearse(system, self._is_outdated)
         self._prefixes = import_declared(
             context.interfaces, lambda line: click.echo(line, err=True)
         )

@@ -23,7 +23,6 @@ from composer.network.transport_profile import shared_memory_variables
 from composer.network.variables import clear_others, drop_unknown_peers, ros_variables
 from composer.planning.snapshot_taking import take_snapshot
 from composer.processes.kernel import check_kernel
-from composer.processes.own_process import note_start
 from composer.programs import shell_environment_kept
 from composer.python_source.module_finder import project_search_path
 from composer.runtime.environment import (
@@ -43,7 +42,6 @@ if TYPE_CHECKING:
 
     from composer.application.reloader import Reloader
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import SystemSpec
 
@@ -61,7 +59,6 @@ def up(  # noqa: PLR0913 - one for each option
     recording: RecordingOptions | None = None,
     hold: Path | None = None,
     ends_process: bool = False,
-    rehearses: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
 
@@ -77,8 +74,6 @@ def up(  # noqa: PLR0913 - one for each option
         recording: What is recorded of it; `None` for nothing.
         hold: While this file is there, no behaviour starts; `None` for no such file.
         ends_process: Whether the process exits afterwards.
-        rehearses: Whether to do only what comes before the system is created, and to print only
-            what keeps it from that.
 
     Raises:
         RosNotFoundError: There is no rclpy.
@@ -97,25 +92,22 @@ def up(  # noqa: PLR0913 - one for each option
         raise UsageError(message, help='give a file')
     if ends_process:
         check_kernel()
-        note_start()
     reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
     begun_ns = time_ns()
     with Workers(ros_arguments, log_levels) as workers:
         context, _files, told = reader.read(
             loaded=lambda system: _spawn_early(workers, system, host)
         )
-        report = _show_errors if rehearses else show_findings
-        report(told)
+        show_findings(told)
         if context is None or has_errors(told):
             return ExitCode.FAILED
         check_ros()
         from composer.application.reloader import Reloader
 
-        if not rehearses:
-            check_loopback(context.spec, {**os.environ, **ros_variables(context.spec)})
-            wait_for_network(context.spec, lambda text: click.echo(text, err=True))
-            wait_for_port(context.spec)
-        variables = _find_variables(context.spec, rehearses=rehearses)
+        check_loopback(context.spec, {**os.environ, **ros_variables(context.spec)})
+        wait_for_network(context.spec, lambda text: click.echo(text, err=True))
+        wait_for_port(context.spec)
+        variables = _find_variables(context.spec)
         with shell_environment_kept(), environment_set({**find_colour(), **variables}):
             check_shell(variables)
             check_log_folder(ros_arguments)
@@ -131,11 +123,10 @@ def up(  # noqa: PLR0913 - one for each option
                 recording=recording or RecordingOptions(),
                 hold=hold,
                 ends_process=ends_process,
-                rehearses=rehearses,
             )
 
 
-def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
+def _find_variables(spec: SystemSpec) -> dict[str, str]:
     """Return the environment that a system starts in; tell what its network lacks."""
     variables = ros_variables(spec)
     if spec.host and spec.network:
@@ -146,9 +137,7 @@ def _find_variables(spec: SystemSpec, *, rehearses: bool) -> dict[str, str]:
     try:
         return {**shared_memory_variables(spec, {**os.environ, **variables}), **variables}
     except ComposerError as error:
-        # The system that runs meanwhile has the room that this one will have.
-        if not rehearses:
-            click.echo(f'network: {error}\n  help: {error.help}', err=True)
+        click.echo(f'network: {error}\n  help: {error.help}', err=True)
         return variables
 
 
@@ -175,11 +164,6 @@ def _refuse_scenario(path: Path) -> None:
         raise UsageError(message, help=f'run it with composer test {path}')
 
 
-def _show_errors(findings: list[Diagnostic]) -> None:
-    if has_errors(findings):
-        show_findings(findings)
-
-
 def _run(  # noqa: PLR0913 - as above
     context: CheckContext,
     create_reloader: Callable[[Sequence[Path]], Reloader],
@@ -192,9 +176,7 @@ def _run(  # noqa: PLR0913 - as above
     recording: RecordingOptions,
     hold: Path | None,
     ends_process: bool,
-    rehearses: bool,
 ) -> int:
-    from composer.executor.after_fork import flush_output
     from composer.interfaces.search_paths import extend_variables
     from composer.runtime.behaviours.callables import project_on_path
 
@@ -203,18 +185,13 @@ def _run(  # noqa: PLR0913 - as above
         environment_set(extend_variables(os.environ, prefixes)),
         project_on_path(project_search_path(context.system.files)),
     ):
-        report = _show_errors if rehearses else show_findings
         snapshot = take_snapshot(context, prefixes)
         workers.spawn(snapshot.spec)
         # It imports ROS, as the workers do meanwhile.
         from composer.runtime.run import run_system
 
         with workers.importing():
-            reading = import_reading(context, snapshot, report, workers)
-        if rehearses:
-            # What modules of behaviours do at the exit is not for here.
-            flush_output()
-            os._exit(ExitCode.FAILED if reading is None else ExitCode.DONE)
+            reading = import_reading(context, snapshot, show_findings, workers)
         if reading is None:
             return ExitCode.FAILED
         reloader = create_reloader(prefixes)

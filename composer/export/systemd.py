@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
-from composer.processes.own_process import own_command
+from composer.programs import own_command
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -15,7 +15,6 @@ from composer.hosts.host_parts import unit_of
 from composer.hosts.host_plan import HostPlan, find_space_problem, plan_host, plan_removal
 from composer.hosts.left_hosts import Candidates, has_part
 from composer.hosts.moves import order_changes, settle_exchanges
-from composer.planning.text import STARTS_AGAIN
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
@@ -52,7 +51,7 @@ class Deployment:
         self._agents = {host.name: HostAgent(host) for host in hosts}
         self._facts: dict[str, Mapping[str, Any]] = {}
         self._releases: dict[str, str] = {}
-        # The hosts whose part starts, or starts again.
+        # The hosts whose part starts.
         self._starting: set[str] = set()
 
     async def __aenter__(self) -> Self:
@@ -310,17 +309,14 @@ class Deployment:
             return
         release = self._releases[name]
         if plan.action == 'reload':
-            told, starts_again = await agent.call(
+            told = await agent.call(
                 'reload',
                 release=release,
                 name=part.name,
                 timeout_sec=_RELOAD_SEC,
-                new_start=STARTS_AGAIN,
             )
             for line in told.splitlines():
                 self._tell(f'{name}: {line.removeprefix(f"{part.name}: ")}')
-            if starts_again:
-                self._starting.add(name)
         else:
             self._starting.add(name)
             self._tell(f'{name}: starting')

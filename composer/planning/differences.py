@@ -176,7 +176,7 @@ def compare(old: Snapshot, new: Snapshot) -> Plan:
 
 
 def find_new_start(old: Snapshot, new: Snapshot) -> Operation | None:
-    """Return why the whole system must start again to become that of `new`; `None` if not."""
+    """Return why a running system cannot become that of `new`; `None` if it can."""
     found = _Comparison(old, new).compare_system()
     return next((each for each in found if each.action is Action.RECREATE), None)
 

@@ -29,8 +29,8 @@ _VERBS = {
     Action.REMOVE: 'to remove',
 }
 _LONGEST_VALUE = 60
-# What a system says to an edit that it cannot take while it runs.
-STARTS_AGAIN = 'the system starts again'
+# Of an edit that no system can take while it runs.
+NEEDS_RESTART = 'this needs a restart: composer down, then composer up'
 
 
 def render_plan(plan: Plan, *, colour: bool = False) -> str:
@@ -75,6 +75,8 @@ def _describe(operation: Operation) -> Iterator[str]:
         yield operation.reason
     if operation.lost:
         yield f'lost: {", ".join(operation.lost)}'
+    if operation.noun == 'system' and operation.action is Action.RECREATE:
+        yield NEEDS_RESTART
     yield from operation.notes
 
 

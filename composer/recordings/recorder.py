@@ -106,25 +106,21 @@ class Recorder:
                 )
             return self._channels[key]
 
-    def finish(self, remarks: Iterable[str] = (), *, goes_on: bool = False) -> None:
+    def finish(self, remarks: Iterable[str] = ()) -> None:
         """Write what is left, complete the file, and say what is in it.
 
         Args:
             remarks: What else there is to say of it.
-            goes_on: Whether one more recording is to have its name.
         """
         self._ended.set()
         self._thread.join(_END_SEC)
         if not self._stream.closed:
             try:
                 self._drain()
-                self._complete(goes_on=goes_on)
+                self._complete()
             except OSError as error:
                 self._fail(error)
-        target = self._place.target
-        with suppress(OSError):
-            target = self._place.make_room() if goes_on else target
-        self._log.info(f"recorded {self._describe_content()} to '{target}'")
+        self._log.info(f"recorded {self._describe_content()} to '{self._place.target}'")
         if self.lost and self.room:
             self._log.error(f'the disk was too slow: {self.lost} more were not recorded')
         for remark in remarks:
@@ -162,15 +158,14 @@ class Recorder:
         self.room = int(min(max(_MOST_BYTES / (size + 1), _FEWEST_MESSAGES), _MOST_MESSAGES))
         self._writer.add_messages(entries)
 
-    def _complete(self, *, goes_on: bool) -> None:
+    def _complete(self) -> None:
         self._writer.define_all()
         described = metadata.describe_recording(self._writer, self._place.file.name)
         text = metadata.render_metadata(described, is_file=False)
         self._writer.add_metadata(metadata.RECORD_NAME, {'serialized_metadata': text})
         self._writer.finish()
         self._stream.close()
-        if not goes_on or self._place.is_folder:
-            self._place.write_metadata(metadata.render_metadata(described, is_file=True))
+        self._place.write_metadata(metadata.render_metadata(described, is_file=True))
 
     def _fail(self, error: Exception) -> None:
         """End the recording: the file has what was written so far."""

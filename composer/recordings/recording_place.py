@@ -64,20 +64,6 @@ class RecordingPlace:
         with suppress(OSError), path.open('x', encoding='utf-8') as stream:
             stream.write(text)
 
-    def make_room(self) -> Path:
-        """Give a complete recording another name, since one more is to have this; return that.
-
-        Raises:
-            OSError: It cannot be renamed.
-        """
-        others = (
-            self.target.with_name(f'{self.target.stem}_{number}{self.target.suffix}')
-            for number in range(1, 10**6)
-        )
-        name = next(each for each in others if not os.path.lexists(each))
-        self.target.rename(name)
-        return name
-
 
 def find_place(target: Path) -> RecordingPlace:
     """Return where a recording is written that the user names so."""

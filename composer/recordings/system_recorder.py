@@ -65,12 +65,8 @@ class SystemRecorder:
         self._graph = GraphRecorder(self._node, self._recorder, self._patterns, self._report, own)
         self._graph.start()
 
-    def stop(self, *, goes_on: bool = False) -> None:
-        """Record what has come, and complete the file; do nothing the second time.
-
-        Args:
-            goes_on: Whether the system starts again: then the name is for the next recording.
-        """
+    def stop(self) -> None:
+        """Record what has come, and complete the file; do nothing the second time."""
         if self._has_ended:
             return
         self._has_ended = True
@@ -81,7 +77,7 @@ class SystemRecorder:
         if self._node is not None:
             self._node.destroy_node()
         seen = self._graph.topics if self._graph else ()
-        self._recorder.finish(self._patterns.describe_unused(seen), goes_on=goes_on)
+        self._recorder.finish(self._patterns.describe_unused(seen))
 
     def _find_tap(
         self, own: _OwnPublishers, publisher: LocalPublisher

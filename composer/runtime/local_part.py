@@ -70,8 +70,8 @@ class SystemRecorder(Protocol):
     def start(self, context: Context, topics: LocalTopics) -> None:
         """Begin, before there are nodes."""
 
-    def stop(self, *, goes_on: bool) -> None:
-        """End, when all nodes have stopped; `goes_on` if the system starts again."""
+    def stop(self) -> None:
+        """End, when all nodes have stopped."""
 
 
 class LocalPart:
@@ -450,7 +450,7 @@ class LocalPart:
         if not (none_killed and ended):
             self._stop_request.set_code(ExitCode.FAILED)
         if self._recorder is not None:
-            self._recorder.stop(goes_on=self._stop_request.starts_again)
+            self._recorder.stop()
         for node in self._nodes.values():
             node.flush_counts()
         self._executor.errors.flush()

@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from composer import signals
 from composer.errors import ComposerError, ExitCode, StartError
 from composer.executor.after_fork import flush_output
-from composer.processes import own_process
 from composer.processes.guardian_client import GuardianClient
 from composer.runtime import forked_children
 from composer.runtime.control.readiness import (
     is_service,
     notify,
-    notify_reload,
     take_notify_socket,
 )
 from composer.runtime.logs import log_levels, system_logger, warn_of_unknown_loggers
@@ -62,8 +60,7 @@ def run_system(  # noqa: PLR0913 - one for each part
 
     The first SIGINT or SIGTERM stops the system, and a second one ends the process at once with
     exit code 1, whoever asked for the stop. SIGHUP stops the system, too, unless it was ignored
-    before, as by `nohup`; it never counts as one of the two. A system that stops to start again
-    does not, after any of them. If a behaviour does not end, this
+    before, as by `nohup`; it never counts as one of the two. If a behaviour does not end, this
     ends the process with the exit code, since its thread cannot end. The guardian ends it if no
     Python code can run. A SIGINT before the system is up gives the exit code 130.
 
@@ -77,8 +74,7 @@ def run_system(  # noqa: PLR0913 - one for each part
             all run in this process.
         hold: While this file is there, no behaviour starts; `None` for no such file.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
-            and how the processes that behaviours have started end with it. Only then can the
-            system start again.
+            and how the processes that behaviours have started end with it.
 
     Returns:
         The exit code.
@@ -119,18 +115,9 @@ def run_system(  # noqa: PLR0913 - one for each part
             try:
                 with watch(system) if watch else nullcontext():
                     system.wait()
-                if stop.starts_again:
-                    notify_reload(notify_socket)
             finally:
                 # Also if a signal handler of a behaviour raised an error in this thread.
                 code, ended = system.stop()
-            if stop.starts_again:
-                guardian.end_stop()
-                if ended:
-                    own_process.finish(lambda: stop.starts_again)
-                own_process.start_again(lambda: stop.starts_again, guardian.send_away)
-                # A signal has come meanwhile.
-                _end_process(stop.code)
         except ComposerError as error:
             code, ended = ExitCode.FAILED, False
             if system.has_ended:
@@ -184,7 +171,7 @@ def _handling_signals(stop: StopRequest, wake_up: int) -> Iterator[None]:
                 stop.kill_processes()
                 _end_process(ExitCode.FAILED)
             has_come = True
-        if not stop.is_set or stop.starts_again:  # The system may stop by itself.
+        if not stop.is_set:  # The system may stop by itself.
             is_early = number == signal.SIGINT and not stop.system_is_up
             stop.make(ExitCode.INTERRUPTED if is_early else ExitCode.DONE)
 

@@ -28,30 +28,19 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.is_set = False
-        self._is_to_start_again = False
-        self._is_final = False
         self.code: int = ExitCode.DONE
         self.system_is_up = False
         self.kill_processes: Callable[[], None] = lambda: None
         self._callbacks: dict[Callable[[], None], None] = {}
         self._wake_ups: queue.SimpleQueue[None] = queue.SimpleQueue()
 
-    @property
-    def starts_again(self) -> bool:
-        """Whether the system is to start again after the stop, as long as nobody ends it."""
-        return self._is_to_start_again and not self._is_final
-
-    def make(self, code: int = ExitCode.DONE, *, starts_again: bool = False) -> None:
+    def make(self, code: int = ExitCode.DONE) -> None:
         """Request the stop, and wake all that wait.
 
         A signal handler may call it while the main thread is anywhere, so it takes no lock that
         `wait` holds; a `threading.Event` would.
         """
         self.set_code(code)
-        if starts_again:
-            self._is_to_start_again = True
-        else:
-            self._is_final = True
         self.is_set = True
         for wake in list(self._callbacks):
             wake()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
 from composer.planning.differences import compare
@@ -12,7 +12,6 @@ from composer.runtime.health.other_hosts import OtherHosts
 from composer.runtime.hold import wait_until_let_go
 from composer.runtime.local_part import LocalPart
 from composer.runtime.logs import system_logger
-from composer.runtime.rewiring.goals_in_flight import wait_for_goals
 from composer.runtime.workers.workers import no_workers
 
 if TYPE_CHECKING:
@@ -157,31 +156,6 @@ class System(LocalPart):
             self._whole = new
             self._processes.is_alone = not new.spec.nodes
         return plan
-
-    @property
-    def can_start_again(self) -> bool:
-        """Whether its process is its own."""
-        return self._guardian.owns_process
-
-    @property
-    def starts_again(self) -> bool:
-        """Whether it stops to start again in this process."""
-        return self._stop_request.starts_again
-
-    def start_again(
-        self, aborts_goals: Callable[[], bool], is_outdated: Callable[[], bool]
-    ) -> None:
-        """Stop, and have this process start the system again as its files say it then.
-
-        Goals in flight are waited for, or aborted as `rewire` does.
-
-        Raises:
-            StartError: There is a newer edit, and the system runs on.
-        """
-        nodes = list(self._nodes.values())
-        actions: list[Any] = [each for node in nodes for each in node.entities['actions'].values()]
-        wait_for_goals(actions, self._stop_request, aborts_goals, is_outdated)
-        self._stop_request.make(starts_again=True)
 
     def ending(self, end: Callable[[], None]) -> AbstractContextManager[bool]:
         """Have `end` called if a stop is requested before the block ends; see `StopRequest`."""

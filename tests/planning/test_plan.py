@@ -196,7 +196,8 @@ EDITS = [
         None,
         [
             "± system 'system': environment.SITE = lab (2); ROS reads this when it starts; "
-            'lost: all that is not in the files'
+            'lost: all that is not in the files; '
+            'this needs a restart: composer down, then composer up'
         ],
     ),
     (

@@ -89,7 +89,8 @@ EDITS = {
         'version: 1\nnetwork: peers',
         [
             "± system 'system': network.discovery = peers (new:2), network.port = 11811 (new:2); "
-            'the middleware reads this when it starts; lost: all that is not in the files'
+            'the middleware reads this when it starts; lost: all that is not in the files; '
+            'this needs a restart: composer down, then composer up'
         ],
     ),
 }  # fmt: skip

@@ -130,29 +130,6 @@ def test_a_system_that_is_rewired_is_recorded_as_it_becomes(compose, tmp_path, w
     assert read_recording(path).topics[0].qos
 
 
-@pytest.mark.parametrize(('target', 'earlier'), [('run.mcap', 'run_1.mcap'), ('bag', 'bag_1')])
-def test_a_system_that_starts_again_begins_a_new_recording(
-    compose, tmp_path, wait_for, target, earlier
-):
-    child = compose(SYSTEM, CODE, '--record', target, '--watch')
-    child.wait_until_ready()
-    wait_until_recorded(wait_for, tmp_path / target, '/numbers', 10)
-    compose.write(SYSTEM + '    environment: {GREETING: hello}\n', CODE)
-    child.wait_for_line(' ready in ', times=2)
-    wait_until_recorded(wait_for, tmp_path / target, '/numbers', 10)
-    assert child.stop() == 0
-
-    for path in (tmp_path / earlier, tmp_path / target):
-        numbers = numbers_of(texts_of(path))
-        assert numbers == list(range(1, len(numbers) + 1))
-        assert read_recording(path).problem == ''
-    folders = [tmp_path] if target == 'run.mcap' else [tmp_path / earlier, tmp_path / target]
-    for folder in folders:
-        told = yaml.safe_load((folder / 'metadata.yaml').read_text())
-        (name,) = told['rosbag2_bagfile_information']['relative_file_paths']
-        assert (folder / name).is_file()
-
-
 def test_rosbags_and_mcap_open_what_was_recorded(compose, tmp_path, wait_for):
     child = compose(SYSTEM, CODE, '--record', 'bag')
     child.wait_until_ready()

@@ -14,7 +14,7 @@ import click
 
 from composer import signals
 from composer.errors import ComposerError, ExitCode
-from composer.processes.own_process import own_command
+from composer.programs import own_command
 from composer.runtime.control.readiness import VARIABLE
 from composer.runtime.environment import check_ros, find_log_folder
 from composer.terminal import escape_output

@@ -62,8 +62,6 @@ from composer.terminal import escape
     metavar='FILE',
     help='Create all nodes, but run no behaviour while this file is there, for 60 s at most.',
 )
-# What a system that must start again asks of another process before.
-@click.option('--rehearse', 'rehearses', is_flag=True, hidden=True)
 @click.option(
     '--help', '-h', 'wants_help', is_flag=True, help='Show this help and the arguments of FILE.'
 )
@@ -81,7 +79,6 @@ def up_command(  # noqa: PLR0913 - one for each option
     record: Path | None,
     topics: tuple[str, ...],
     hold: Path | None,
-    rehearses: bool,
     wants_help: bool,
 ) -> int:
     """Check FILE, then run its system until it is stopped.
@@ -123,7 +120,6 @@ def up_command(  # noqa: PLR0913 - one for each option
         recording=RecordingOptions(record, topics),
         hold=hold,
         ends_process=True,
-        rehearses=rehearses,
     )
 
 

@@ -130,23 +130,11 @@ class Transaction:
         time.sleep(_SETTLE_SEC)
         self._service.check_start(self._service.state())
 
-    def reload(self, release: str, name: str, timeout_sec: float, new_start: str) -> list[Any]:
-        """Let the system that runs become what a release says.
-
-        If it starts again for that, it is held.
-
-        Args:
-            new_start: What it says then.
-
-        Returns:
-            What it says, and whether it starts again.
-        """
+    def reload(self, release: str, name: str, timeout_sec: float) -> str:
+        """Let the system that runs become what a release says; return what it says."""
         self._release, self._reloads = release, True
-        write_file(self.hold, b'')
         self._store.choose(release)
-        told = self._reload(name, timeout_sec)
-        self._reloads = new_start not in told
-        return [told, not self._reloads]
+        return self._reload(name, timeout_sec)
 
     def _reload(self, name: str, timeout_sec: float) -> str:
         command = [str(self._store.live / 'composer'), 'reload', name]

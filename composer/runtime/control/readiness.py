@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import socket
-import time
 from contextlib import suppress
 
 VARIABLE = 'NOTIFY_SOCKET'
@@ -27,12 +26,6 @@ def is_service() -> bool:
     Source: https://www.freedesktop.org/software/systemd/man/latest/systemd.exec.html
     """
     return os.environ.get('SYSTEMD_EXEC_PID') == str(os.getpid())
-
-
-def notify_reload(address: str | None) -> None:
-    """Tell that the system starts again, and will be up later."""
-    stamp = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
-    notify(address, f'RELOADING=1\nMONOTONIC_USEC={stamp}')
 
 
 def notify(address: str | None, state: str) -> None:

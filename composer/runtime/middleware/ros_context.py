@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from rclpy.context import Context
 
 from composer.errors import StartError, UsageError
-from composer.processes import own_process
 from composer.runtime.middleware.shared_memory import remove_left_segments
 from composer.runtime.reserved_methods import reserve
 
@@ -87,8 +86,6 @@ def leave_graph_at_exit(context: Context, nodes: Any) -> bool:
     # The last one is called first, the first one with the exit code.
     for function in (libc._exit, libc.fcloseall, stop_all):  # noqa: SLF001 - a name of C
         libc.on_exit(function, None)
-    own_process.before_start_again(stop_all)
-    own_process.before_start_again(lambda: libc.fflush(None))
     return True
 
 
