@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _KINDS = ('msg', 'srv', 'action')
 _HELP_FOR_TYPES = "'composer interfaces list' shows the types"
+# Of the file of a type: file systems take 255 bytes, with the ending.
+_LONGEST_NAME = 200
 _SEPARATORS = re.compile(r'[/.:]+')
 
 
@@ -313,6 +315,8 @@ def _as_type(text: str, kind: str) -> str:
 
 def _find_type(name: str, kind: str) -> str:
     """Return the full name of a type that an installed package has; empty if none has."""
+    if not (name.isascii() and len(name) < _LONGEST_NAME):
+        return ''
     prefixes = ament_prefixes()
     files = (path for each in prefixes for path in each.glob(f'share/*/{kind}/{name}.{kind}'))
     packages = sorted(path.parts[-3] for path in files)

@@ -88,6 +88,7 @@ class LiveNode:
         lifecycle: Its lifecycle; `None` for a node without.
         remote_parameters: Gets and sets those of other nodes.
         owners: The classes of its instances, by `module:Class`.
+        full_name: Its name with its namespace.
     """
 
     spec: NodeSpec
@@ -118,12 +119,12 @@ class LiveNode:
     _views: dict[Owner, Node] = field(default_factory=dict)
     owners: dict[str, type] = field(default_factory=dict)
     _instances: dict[type, Any] = field(default_factory=dict)
+    full_name: str = field(init=False)
     _is_destroyed: bool = False
 
-    @property
-    def full_name(self) -> str:
-        """The node's name with its namespace."""
-        return str(self.ros.get_fully_qualified_name())
+    def __post_init__(self) -> None:
+        """Keep its name with its namespace: others ask for it when it is gone."""
+        self.full_name = str(self.ros.get_fully_qualified_name())
 
     def group(self, name: str | None) -> CallbackGroup:
         """Return the callback group of this name; `None` is the node's own."""

@@ -124,7 +124,7 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
         print('go', file=sender.stdin, flush=True)
         wait_for(lambda: missed().overruns, 'the first overrun')
         slow.may_end.set()
-        wait_for(lambda: slow.heard[-1] == 199, 'the last message')
+        wait_for(lambda: slow.heard[-1:] == [199], 'the last message')
         if reliability == 'RELIABLE':
             wait_for(
                 lambda: missed().overruns == 200 - len(slow.heard),
