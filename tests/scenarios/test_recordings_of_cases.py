@@ -111,7 +111,7 @@ def test_a_topic_of_another_type_is_found(load, tmp_path):
     write_recording(tmp_path / 'other.mcap', {'/out': [String()], '/scan': [String()]})
     message = (
         "conflicting-types: '{}' is a std_msgs/msg/String in the recording, "
-        'and a sensor_msgs/msg/LaserScan in the system (None)'
+        'and is a sensor_msgs/msg/LaserScan in the system (None)'
     )
     assert check(load('recording: other.mcap', '{topic: /out, like: other.mcap}')) == [
         message.format('/scan'),
