@@ -69,8 +69,11 @@ def replaced(threads: SimulatedThreads, start_time_ns: int, seed: int) -> Iterat
         _running.append(threads)
         stack.callback(_running.remove, threads)
         if gc.isenabled():
-            # The simulated threads collect it, in turns of their own.
-            gc.collect()
+            # The simulated threads collect it, in turns of their own; what was there before is
+            # not theirs, and would take most of the time.
+            gc.collect(1)
+            gc.freeze()
+            stack.callback(gc.unfreeze)
             gc.disable()
             stack.callback(gc.enable)
         stack.callback(begin(watch))
