@@ -46,10 +46,10 @@ _Due: TypeAlias = 'tuple[int, int, int, Wait | Call]'
 
 
 class WaitingWhilePickingError(ComposerError):
-    """What is only asked whether something has come waits itself."""
+    """A finalizer or a condition waits while the next thread is chosen."""
 
     def __init__(self) -> None:
-        message = 'a finalizer or a condition waits while it is looked for what comes next'
+        message = 'a finalizer or a condition waits while the simulation chooses the next thread'
         super().__init__(message, help='wait in a behaviour, or in a thread of its own')
 
 

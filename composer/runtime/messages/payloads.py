@@ -17,7 +17,6 @@ Both stop at the first error.
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from types import SimpleNamespace
 from typing import Any, Final
 
 from composer.errors import ComposerError
@@ -51,6 +50,15 @@ class PayloadError(ComposerError):
         super().__init__(format_field_error(type_name, error.path, str(error)), help=error.help)
         self.type_name = type_name
         self.path = error.path
+
+
+class _Unbuilt:
+    """Stands for a message that nobody hears, and keeps none of its values."""
+
+    __slots__ = ()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        pass
 
 
 class PayloadConverter:
@@ -93,8 +101,8 @@ class PayloadConverter:
             for field in description.fields
         )
         first = description.fields[0] if len(description.fields) == 1 else None
-        ownership, nothing = ownership_of(message_class), SimpleNamespace()
-        self._blank: Callable[[], Any] = ownership.blank if builds else lambda: nothing
+        ownership = ownership_of(message_class)
+        self._blank: Callable[[], Any] = ownership.blank if builds else _Unbuilt
         self._defaults = ownership.defaults if builds else ()
         self._single = first.name if first else None
         self._takes_bare_messages = first is not None and first.type.kind == 'message'

@@ -1,5 +1,7 @@
 """Payloads become messages; each test that converts also shows what a subscriber would get."""
 
+import weakref
+from array import array
 from collections import OrderedDict, UserDict
 from math import pi
 from typing import Any
@@ -14,6 +16,7 @@ from geometry_msgs.msg import Point32, Polygon, PoseStamped, Twist, Vector3
 from rclpy.duration import Duration as RclpyDuration
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time as RclpyTime
+from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Bool, Byte, Char, Empty, Float64, Header, Int32, String
 from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import NestedMessage
@@ -389,3 +392,11 @@ def test_a_given_mapping_is_not_changed() -> None:
 def test_a_converter_is_compiled_once() -> None:
     assert converter_for(Builtins) is converter_for(Builtins)
     assert converter_for(Builtins) is not converter_for(Twist)
+
+
+def test_what_nobody_hears_is_let_go() -> None:
+    data = array('B', bytes(100))
+    rest = weakref.ref(data)
+    converter_for(CompressedImage, builds=False).convert({'data': data})
+    del data
+    assert rest() is None
