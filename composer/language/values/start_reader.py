@@ -61,7 +61,8 @@ class StartValueReader:
             return value.sample
         try:
             found = self._find(value)
-            hide(found, value.origin)
+            if not value.command:
+                hide(found, value.origin)
             return _converted(value, found)
         except ComposerError as error:
             message = f'{value.span}: {value.name}: {error}'
