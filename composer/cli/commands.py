@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from composer.cli.checking.declarations import COMMANDS as CHECKING_COMMANDS
+from composer.cli.common.argument_types import takes_format
 from composer.cli.exporting.declarations import export_command
 from composer.cli.hosts.declarations import COMMANDS as HOST_COMMANDS
 from composer.cli.importing.declarations import import_command
@@ -94,6 +95,15 @@ def new_command(name: str) -> int:
     from composer.cli.new import create_project
 
     return create_project(name)
+
+
+@cli.command('doctor')
+@takes_format()
+def doctor_command(format_name: str) -> int:
+    """Say what systems lack on this computer, and what to do."""
+    from composer.cli.doctor import examine
+
+    return examine(format_name)
 
 
 @cli.group('interfaces', invoke_without_command=True, subcommand_metavar=_SUBCOMMAND)

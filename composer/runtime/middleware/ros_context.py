@@ -76,7 +76,7 @@ def leave_graph_at_exit(context: Context, nodes: Any) -> bool:
     Returns:
         Whether it does. It is known of Fast DDS, and of the C library GNU's.
     """
-    stop_all, libc = _find_stop_all(), ctypes.CDLL(None)
+    stop_all, libc = find_stop_all(), ctypes.CDLL(None)
     if stop_all is None or not hasattr(libc, 'on_exit'):
         return False
     for each in (context, nodes):
@@ -89,7 +89,7 @@ def leave_graph_at_exit(context: Context, nodes: Any) -> bool:
     return True
 
 
-def _find_stop_all() -> Any:
+def find_stop_all() -> Any:
     """Return the function of Fast DDS that shuts it down; `None` if ROS does not use it."""
     found = re.search(r'/\S*/(libfastrtps|libfastdds)\.so\S*', Path('/proc/self/maps').read_text())
     # As in `PyDLL`: while it runs, no other thread may use what it shuts down.
