@@ -189,7 +189,9 @@ def find_declaration_errors(
     places: list[tuple[tuple[str | int, ...], Any]] = [(('default',), default)]
     places += [(('choices', index), choice) for index, choice in enumerate(choices)]
     for keys, value in places:
-        if value is not None and (problem := _find_default_problem(value, argument.type)):
+        is_computed = argument.is_computed and value == argument.default
+        problem = None if is_computed else _find_default_problem(value, argument.type)
+        if value is not None and problem:
             yield keys, problem, find_help(argument, value)
     if default is not None and choices and default not in choices:
         message = f'the default {default!r} is not one of the choices'
@@ -280,7 +282,11 @@ def find_value_problem(argument: ArgumentSpec, value: Any) -> str | None:
 
 def find_help(argument: ArgumentSpec, value: Any) -> str | None:
     """Return the help for a wrong value of an argument."""
-    return suggest_bool(value) if argument.type == 'bool' else suggest(value, argument.choices)
+    if argument.type == 'bool':
+        return suggest_bool(value)
+    # Why there is one choice is in the description.
+    only = argument.description if len(argument.choices) == 1 else ''
+    return only or suggest(value, argument.choices)
 
 
 def _parse_text(text: str, type_name: str) -> Any:

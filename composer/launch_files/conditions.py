@@ -19,12 +19,8 @@ def read_condition(place: Place, condition: Any) -> Condition:
         return _compared(place, condition, is_equal='LaunchConfigurationNotEquals' not in kinds)
     predicate = private(condition, 'predicate_expression')
     if predicate is None:
-        place.scope.fill(place.loader.context)
-        place.remark('the condition was resolved')
-        with place.loader.reading() as read:
-            holds = bool(condition.evaluate(place.loader.context))
-        place.fix(read)
-        return Condition('', holds)
+        context = place.loader.context
+        return Condition('', place.resolve(kinds[0], lambda: bool(condition.evaluate(context))))
     value = Resolver(place).text(predicate)
     holds = truth_of(value)
     is_unless = 'UnlessCondition' in kinds

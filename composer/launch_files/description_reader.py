@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ComposerError
 from composer.launch_files.conditions import read_condition
 from composer.launch_files.launched_programs import ProgramReader, ends_system
-from composer.launch_files.opaque import OpaqueRuns
 from composer.launch_files.parameters import ParameterReader
 from composer.launch_files.place import join_namespaces, number_code
 from composer.launch_files.results import Argument, LaunchError
-from composer.launch_files.substitutions import Resolver, class_names, private
+from composer.launch_files.substitutions import Resolver, class_names, private, text_of
 from composer.launch_files.surroundings import Setting, Wait
 from composer.launch_files.texts import Text, joined, one
 
@@ -41,7 +40,6 @@ class DescriptionReader:
     def __init__(self, place: Place) -> None:
         self.place = place
         self._programs = ProgramReader(place, self.read)
-        self._opaque = OpaqueRuns(place, _read_at)
 
     @property
     def _resolver(self) -> Resolver:
@@ -165,10 +163,8 @@ class DescriptionReader:
         path = Path(location.text)
         is_code = private(source, 'launch_description') is not None and not os.path.isfile(path)
         if os.path.isfile(path) or is_code or not location.text:
-            if self.place.result.freeze(location):
-                what = 'which file is included depends on arguments'
-                self.place.remark(f'{what}; here {path.name}')
-            self.place.scope.fill(self.place.loader.context)
+            self.place.freeze(f'the include of {path.name}', location)
+            self.place.scope.fill(self.place.loader.context, self.place.given)
             return self.place.loader.load(source, self.place.scope.file)
         self.place.remark(f"'{location.text}' is not here: ros2 launch will run it")
         written = location.written()
@@ -180,7 +176,19 @@ class DescriptionReader:
         return None
 
     def _function(self, entity: Any) -> None:
-        self._opaque.run(entity)
+        scope, context = self.place.scope, self.place.loader.context
+        function = private(entity, 'function')
+        arguments, keywords = private(entity, 'args') or (), private(entity, 'kwargs') or {}
+        entities = self.place.resolve(
+            f'OpaqueFunction {function.__name__}',
+            lambda: function(context, *arguments, **keywords),
+        )
+        for name, value in context.launch_configurations.items():
+            before = scope.configurations.get(name)
+            old = before.text if isinstance(before, Text) else self.place.given.get(name)
+            if isinstance(value, str) and value != old:
+                scope.set(name, text_of(value))
+        self.read(entities or ())
 
     def _timer(self, entity: Any) -> None:
         period = self._resolver.text(private(entity, 'period'))
@@ -300,20 +308,15 @@ class DescriptionReader:
         if not hasattr(entity, 'execute'):
             self.place.remark(f'{describe(entity)} cannot be kept')
             return
-        self.place.scope.fill(self.place.loader.context)
+        context = self.place.loader.context
         try:
-            with self.place.loader.reading() as read:
-                further = entity.execute(self.place.loader.context)
-        except Exception as error:  # noqa: BLE001 - it is foreign code
+            further = self.place.resolve(describe(entity), lambda: entity.execute(context))
+        except LaunchError as error:
             self.place.remark(f'{describe(entity)} cannot be kept: {error}')
             return
-        self.place.fix(read)
-        self.place.remark(f'{describe(entity)} was resolved')
+        if not further:
+            self.place.remark(f'{describe(entity)} was run by the import')
         self.read(further or ())
-
-
-def _read_at(place: Place, entities: Iterable[Any]) -> None:
-    DescriptionReader(place).read(entities)
 
 
 def describe(entity: Any) -> str:

@@ -128,9 +128,29 @@ class _Configurations(dict[str, Any]):
         self._note(name)
         return super().__getitem__(name)
 
+    def __contains__(self, name: object) -> bool:
+        self._note(name)
+        return super().__contains__(name)
+
     def get(self, name: str, default: Any = None) -> Any:
         self._note(name)
         return super().get(name, default)
+
+    def items(self) -> Any:
+        self._note_all()
+        return super().items()
+
+    def values(self) -> Any:
+        self._note_all()
+        return super().values()
+
+    def copy(self) -> Any:
+        self._note_all()
+        return super().copy()
+
+    def _note_all(self) -> None:
+        for name in self:
+            self._note(name)
 
 
 class _Origins:

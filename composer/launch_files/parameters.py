@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.substitutions import Resolver, class_names, private, read_file
-from composer.launch_files.texts import Computed, Text, constant, only_if, read_yaml
+from composer.launch_files.texts import Computed, Text, only_if, read_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -212,7 +212,7 @@ class ParameterReader:
     def _keep_content(self, read: Parameters, path: Text) -> None:
         data = read_file(path.text)
         if isinstance(data, dict) and path.is_constant:
-            read.files[-1] = NewFile(_unmarked(data))
+            read.files[-1] = NewFile(data)
 
     def _translated(self, data: Any) -> Any:
         if isinstance(data, dict):
@@ -241,17 +241,6 @@ def _rewritten(data: Any, by_name: dict[str, Any], by_value: dict[str, Any]) -> 
         elif isinstance(value, str) and value in by_value:
             changed[key] = by_value[value]
     return changed
-
-
-def _unmarked(data: Any) -> Any:
-    """Return data with expressions in place of marks."""
-    if isinstance(data, dict):
-        return {constant(str(key)).written(): _unmarked(value) for key, value in data.items()}
-    if isinstance(data, list):
-        return [_unmarked(item) for item in data]
-    if isinstance(data, str) and not constant(data).is_constant:
-        return constant(data).typed()
-    return data
 
 
 def _names_in(file: Any) -> set[str]:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from composer.errors import ComposerError
 from composer.expressions import written_in_expression
 from composer.launch_files.results import Argument, Entry, Imported, LaunchError
 from composer.launch_files.surroundings import Scope
 from composer.launch_files.texts import Computed, Text, joined, one
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable
 
     from composer.launch_files.loading import Loader
+
+Result = TypeVar('Result')
 
 
 class Place:
@@ -31,7 +33,7 @@ class Place:
         self.loader = loader
         self.given = given
         self.scope = Scope()
-        self.result = Imported()
+        self.result = Imported(given=given)
         self.origin = ''
         self.depth = 0
 
@@ -58,10 +60,45 @@ class Place:
         self.result.arguments.setdefault(name, argument)
         return one(written_in_expression(name), argument.given)
 
-    def fix(self, names: Iterable[str]) -> None:
-        """Note that the value of a configuration decides what foreign code does."""
-        values = map(self.scope.configurations.get, names)
-        self.result.freeze(*(each for each in values if isinstance(each, Text)))
+    def declare_rest(self) -> None:
+        """Declare the arguments of the import that nothing declares: code may have read them."""
+        self.origin = ''
+        for name in self.given:
+            if name not in self.result.arguments:
+                self.remark(f"no action declares the argument '{name}'")
+                self.declare(Argument(name, None, fixed=True))
+
+    def resolve(self, what: str, code: Callable[[], Result]) -> Result:
+        """Run code of the launch file, and fix the arguments that it reads.
+
+        Raises:
+            LaunchError: It fails.
+        """
+        context = self.loader.context
+        self.scope.fill(context, self.given)
+        with self.loader.reading() as read:
+            try:
+                result = code()
+            except ComposerError:
+                raise
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                message = f'{self.origin}: {what}: {type(error).__name__}: {error}'
+                raise LaunchError(message) from error
+        values = map(self.scope.configurations.get, read)
+        self.freeze(what, *(value for value in values if isinstance(value, Text)))
+        return result
+
+    def freeze(self, what: str, *used: Text | str) -> None:
+        """Keep the values of the arguments in texts and expressions: something depends on them.
+
+        Args:
+            what: What depends on them.
+        """
+        fixed = [f'{each.name}:={each.given}' for each in self.result.freeze(*used)]
+        if fixed:
+            self.remark(f'{what} was resolved for {", ".join(fixed)}')
 
     def add(self, section: str, name: str, data: dict[str, Any], action: Any) -> Entry:
         """Add an entry to the system."""
@@ -91,43 +128,6 @@ class Place:
         )
         self.result.entries.append(entry)
         return entry
-
-    def forked(self) -> Place:
-        """Return the same place with results of its own."""
-        other = Place(self.loader, self.given)
-        other.scope = Scope(
-            {
-                name: list(value) if isinstance(value, list) else value
-                for name, value in self.scope.configurations.items()
-            },
-            dict(self.scope.environment),
-            list(self.scope.conditions),
-            list(self.scope.waits),
-            self.scope.delay,
-            self.scope.file,
-            list(self.scope.configuration_stack),
-            list(self.scope.environment_stack),
-        )
-        other.result.arguments = {
-            name: replace(each) for name, each in self.result.arguments.items()
-        }
-        other.result.entries = list(self.result.entries)
-        other.result.files = list(self.result.files)
-        other.origin = self.origin
-        other.result.started = self.result.started
-        other.depth = self.depth
-        return other
-
-    def adopt(self, other: Place) -> None:
-        """Go on as a place that was forked."""
-        self.scope.configurations = other.scope.configurations
-        self.scope.environment = other.scope.environment
-        self.result.arguments = other.result.arguments
-        self.result.entries = other.result.entries
-        self.result.files = other.result.files
-        for remark in other.result.remarks:
-            if remark not in self.result.remarks:
-                self.result.remarks.append(remark)
 
 
 def join_namespaces(outer: Any, own: Text) -> Text:

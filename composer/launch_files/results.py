@@ -44,14 +44,6 @@ class Argument:
     given: str = ''
     fixed: bool = False
 
-    @property
-    def is_fixed_expression(self) -> bool:
-        """Whether it keeps a default that is computed, and that nobody has given."""
-        default = self.default
-        is_computed = default is not None and not default.is_constant
-        has_default = default is not None and default.text == self.given
-        return self.fixed and is_computed and has_default and self.name.isidentifier()
-
 
 @dataclass
 class Entry:
@@ -80,6 +72,7 @@ class Imported:
     """What a launch file consists of.
 
     Attributes:
+        given: The values of arguments that the import was given.
         started: When the import began, in seconds: files of before are not written by it.
     """
 
@@ -87,10 +80,11 @@ class Imported:
     entries: list[Entry] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    given: Mapping[str, str] = field(default_factory=dict)
     started: float = field(default_factory=time.time)
 
-    def freeze(self, *used: Text | str) -> bool:
-        """Keep the arguments in texts and expressions as they are; return whether there are any.
+    def freeze(self, *used: Text | str) -> list[Argument]:
+        """Keep the arguments in texts and expressions as they are, and return them.
 
         For what cannot follow them: it was read or decided by the import.
         """
@@ -99,7 +93,7 @@ class Imported:
             if not argument.fixed:
                 argument.fixed = True
                 self.freeze(argument.default or '')
-        return bool(found)
+        return found
 
     def depends(self, *used: Text | str) -> list[Argument]:
         """Return the arguments in texts and expressions."""
@@ -121,10 +115,10 @@ class Imported:
             return False
         return is_new and path.startswith(f'{tempfile.gettempdir()}/') and os.path.isfile(path)
 
-    def words(self, given: Mapping[str, str]) -> list[str]:
+    def words(self) -> list[str]:
         """Return the arguments that the system is imported with, as on a command line."""
         return [
             f'{name}:={each.given}'
             for name, each in self.arguments.items()
-            if name in given or each.default is None
+            if name in self.given or each.default is None
         ]

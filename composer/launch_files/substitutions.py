@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from composer.ament import find_share
-from composer.launch_files.marks import run_marked
 from composer.launch_files.python_expressions import UnlikeError, translate
 from composer.launch_files.results import Argument, LaunchError
 from composer.launch_files.texts import (
@@ -26,7 +25,6 @@ from composer.launch_files.texts import (
     one,
     read_yaml,
     split_words,
-    unmarked,
 )
 
 if TYPE_CHECKING:
@@ -100,32 +98,12 @@ class Resolver:
         return self._performed(written)
 
     def _performed(self, written: Any) -> Text:
-        """Return what `launch` makes of a substitution, with marks where arguments are in it."""
-        text, fixed = run_marked(
-            self._scope.configurations,
-            lambda marks: self._perform(written, marks),
-            self._outcome,
+        """Return what a class of the launch file's own makes of the arguments as they are."""
+        context = self._context
+        result = self._place.resolve(
+            type(written).__name__, lambda: context.perform_substitution(written)
         )
-        if fixed:
-            self._place.fix(fixed)
-            shown = ', '.join(fixed)
-            self._remark(f'{type(written).__name__} was resolved: it depends on {shown}')
-        return text_of(text)
-
-    def _perform(self, written: Any, marks: frozenset[str]) -> tuple[str, list[str]]:
-        self._scope.fill(self._context, marks)
-        with self._place.loader.reading() as read:
-            try:
-                return str(self._context.perform_substitution(written)), read
-            except Exception as error:
-                kind = type(written).__name__
-                message = f'{self._place.origin}: {kind} cannot be resolved: {error}'
-                raise LaunchError(message) from error
-
-    def _outcome(self, text: str) -> str:
-        """Return what a substitution gives: of a new file, what stands in it."""
-        path = unmarked(text)
-        return unmarked(repr(read_file(path))) if self._place.result.is_new_file(path) else path
+        return text_of(str(result))
 
     def _text(self, written: Any) -> Text:
         return text_of(str(written.text))
@@ -193,13 +171,11 @@ class Resolver:
     def _python(self, written: Any) -> Text:
         source = self.text(private(written, 'expression'))
         modules = [self.text(each).text for each in private(written, 'python_modules') or ()]
-        self._scope.fill(self._context)
         result = str(self._evaluated(source.text, modules))
         try:
             return translate(source, result)
         except UnlikeError:
-            self._place.result.freeze(source)
-            self._remark(f'{source.text} was resolved to {result}')
+            self._place.freeze(source.text, source)
             return text_of(result)
 
     def _evaluated(self, source: str, modules: Sequence[str]) -> Any:
@@ -306,17 +282,14 @@ def _is_share(part: Code) -> bool:
 
 def text_of(text: str) -> Text:
     """Return a text, with the share folders of packages in it as `find(…)`."""
-    plain = constant(text)
-    first = plain.parts[0] if plain.parts else ''
-    found = _SHARE.match(first) if isinstance(first, str) else None
-    if found is None or not isinstance(first, str):
-        return plain
+    found = _SHARE.match(text)
+    if found is None:
+        return constant(text)
     folder, package = f'{found[1]}/share/{found[2]}', found[2]
     if str(find_share(package)) != folder and not folder.startswith(f'{_ABSENT}/'):
-        return plain
-    scheme = 'file://' if first.startswith('file://') else ''
-    rest = first[found.end() :]
-    parts = (scheme, Code(f"find('{package}')", folder), rest, *plain.parts[1:])
+        return constant(text)
+    scheme = 'file://' if text.startswith('file://') else ''
+    parts = (scheme, Code(f"find('{package}')", folder), text[found.end() :])
     return Text(tuple(part for part in parts if part))
 
 

@@ -6,11 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from composer.launch_files.marks import Mark
 from composer.launch_files.texts import Text, chosen, one
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterator, Mapping
     from pathlib import Path
 
 
@@ -147,21 +146,21 @@ class Scope:
         finally:
             self.waits, self.delay = before
 
-    def fill(self, context: Any, marks: frozenset[str] = frozenset()) -> None:
+    def fill(self, context: Any, given: Mapping[str, str]) -> None:
         """Give the configurations to the context of `launch`.
 
         Args:
-            marks: Those that it is given as marks, and not as they are.
+            given: The arguments of the import: `launch` sets them also if nothing declares them.
         """
         real = context.launch_configurations
         real.clear()
-        for name, value in self.configurations.items():
-            real[name] = _plain(value, is_marked=name in marks)
+        real.update(given)
+        real.update({name: _plain(value) for name, value in self.configurations.items()})
 
 
-def _plain(value: Any, *, is_marked: bool) -> Any:
+def _plain(value: Any) -> Any:
     if isinstance(value, Text):
-        return Mark(value) if is_marked and not value.is_constant else value.text
+        return value.text
     values = [item.value for item in value if item.holds]
     return [
         tuple(each.text if isinstance(each, Text) else each for each in item)

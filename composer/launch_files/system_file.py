@@ -6,17 +6,18 @@ import re
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from composer.launch_files.parameters import NewFile
-from composer.launch_files.texts import Computed, Text, constant, unmarked
+from composer.launch_files.texts import Computed, Text
 from composer.terminal import escape
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
     from composer.launch_files.results import Argument, Entry, Imported
 
-_FIXED = 'What the launch file does depends on it: import again to change it.'
+_FIXED = 'Fixed by the import. For another value:'
 _SECTIONS = ('processes', 'containers')
 _NEW_FILE = re.compile(rf'{re.escape(tempfile.gettempdir())}/[\w./-]+')
 _NAME = re.compile(r'[^A-Za-z0-9_.-]+')
@@ -30,16 +31,16 @@ class SystemFile:
     files: dict[str, str] = field(default_factory=dict)
 
 
-def render_system(
-    imported: Imported, source: str, stem: str, folder: str | None = None
-) -> SystemFile:
+def render_system(imported: Imported, source: Path, output: Path | None = None) -> SystemFile:
     """Return an imported launch file as a system.
 
     Args:
-        source: What was imported, for the first line.
-        stem: The name of the system, for the folder of its parameter files.
-        folder: Where it is to stand: paths below that are written as `{{ here }}/…`.
+        source: The launch file.
+        output: Where it is to stand: paths below that folder are written as `{{ here }}/…`.
     """
+    stem = output.stem if output else source.name.partition('.')[0]
+    # Not `resolve`: launch leaves links in its paths.
+    folder = str(output.parent.absolute()) if output else None
     written = SystemFile()
     lines: list[str] = []
     common = _common_environment(imported.entries)
@@ -59,19 +60,31 @@ def render_system(
     if imported.remarks:
         lines += ['', '# Not kept as it was:']
         lines += [f'# {_one_line(remark)}' for remark in imported.remarks]
-    written.text = '\n'.join([*_head(imported, source), *lines]) + '\n'
+    written.text = '\n'.join([*_head(imported, source, output), *lines]) + '\n'
     return written
 
 
-def _head(imported: Imported, source: str) -> list[str]:
-    lines = [f'# Imported from {_one_line(source)}.', 'version: 1']
-    fixed = [each for each in imported.arguments.values() if each.is_fixed_expression]
-    lines += _arguments([each for each in imported.arguments.values() if each not in fixed])
-    for index, each in enumerate(fixed):
-        # The name of a variable is that of no argument.
-        lines += ['', 'vars:'] if index == 0 else []
-        value = render_yaml({each.name: each.default.written() if each.default else ''})
-        lines += [f'  # {_FIXED}', *(f'  {line}' for line in value.splitlines())]
+def _head(imported: Imported, source: Path, output: Path | None) -> list[str]:
+    lines = [f'# Imported from {_one_line(source.name)}.', 'version: 1']
+    lines += ['', 'args:'] if imported.arguments else []
+    for argument in imported.arguments.values():
+        data = _declaration(argument, is_given=argument.name in imported.given)
+        if argument.fixed:
+            words = [
+                f'{name}:={text}' for name, text in imported.given.items() if name != argument.name
+            ]
+            target = ['-o', str(output)] if output else []
+            command = [
+                'composer',
+                'import',
+                str(source),
+                *words,
+                f'{argument.name}:=VALUE',
+                *target,
+            ]
+            text = f'{_FIXED} {" ".join(map(quote, command))}'
+            data['description'] = f'{data.get("description", "")} {text}'.strip()
+        lines += [f'  {line}' for line in render_yaml({argument.name: data}).splitlines()]
     return lines
 
 
@@ -80,26 +93,16 @@ def _one_line(text: str) -> str:
     return escape(' '.join(text.split()))
 
 
-def _arguments(arguments: Any) -> list[str]:
-    if not arguments:
-        return []
-    lines = ['', 'args:']
-    for argument in arguments:
-        if argument.fixed:
-            lines.append(f'  # {_FIXED}')
-        data = render_yaml({argument.name: _declaration(argument)})
-        lines += [f'  {line}' for line in data.splitlines()]
-    return lines
-
-
-def _declaration(argument: Argument) -> dict[str, Any]:
+def _declaration(argument: Argument, *, is_given: bool) -> dict[str, Any]:
     data: dict[str, Any] = {'type': 'string'}
-    if argument.default is not None:
-        data['default'] = argument.given if argument.fixed else argument.default.written()
+    if argument.fixed and (is_given or argument.default is None):
+        data['default'] = argument.given
+    elif argument.default is not None:
+        data['default'] = argument.default.written()
     if argument.description:
         data['description'] = ' '.join(argument.description.split())
     if argument.fixed:
-        data['choices'] = [argument.given]
+        data['choices'] = [data['default']]
     elif argument.choices:
         data['choices'] = list(argument.choices)
     return data
@@ -175,10 +178,8 @@ class _Copies:
         except ValueError:
             self.imported.remarks.append(f"'{path}' was written by the import: keep a copy of it")
             return found[0]
-        # What the import has written into it does not change.
-        self.imported.freeze(constant(content))
         name = f'{self.folder}/{path.name}'
-        self.written.files[name] = unmarked(content)
+        self.written.files[name] = content
         return f'{{{{ here }}}}/{name}'
 
 

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 # `python-bool` is `True` as a text, all other booleans are `true`.
 Kind: TypeAlias = Literal['text', 'bool', 'python-bool', 'number']
 
-# In place of a value that a function of the launch file is given: it shows up in what it makes.
-_MARK = re.compile('\ue000([^\ue001]*)\ue001')
-
 
 class Computed(Expression):
     """A text of the language with expressions.
@@ -125,32 +122,8 @@ EMPTY = Text(())
 
 
 def constant(text: str) -> Text:
-    """Return a text with what was marked in it by `marked` as expressions again."""
-    if not has_marks(text):
-        return Text((text,)) if text else EMPTY
-    parts: list[str | Code] = []
-    for index, piece in enumerate(_MARK.split(text)):
-        if index % 2:
-            name, _, value = piece.partition('\ue002')
-            parts.append(Code(name, value))
-        elif piece:
-            parts.append(piece)
-    return Text(tuple(parts))
-
-
-def marked(text: Text) -> str:
-    """Return a text that stands for another one in what a function makes of it."""
-    return f'\ue000{text.code}\ue002{text.text}\ue001'
-
-
-def has_marks(text: object) -> bool:
-    """Return whether something is a text with marks."""
-    return isinstance(text, str) and _MARK.search(text) is not None
-
-
-def unmarked(text: str) -> str:
-    """Return a text with the values of what was marked in it."""
-    return _MARK.sub(lambda found: found[1].partition('\ue002')[2], text)
+    """Return a text that depends on nothing."""
+    return Text((text,)) if text else EMPTY
 
 
 def one(code: str, text: str, kind: Kind = 'text') -> Text:

@@ -122,6 +122,7 @@ def test_a_value_is_computed_after_those_that_it_needs_whatever_the_order_of_the
         # What an argument without a value will be is not known.
         ('args: {n: {type: string}, a: {type: integer, default: "{{ n | int }}"}}', []),
         ('args: {n: {type: string}, a: {choices: [x, y], default: "{{ n }}"}}', []),
+        ('args: {n: x, a: {choices: ["{{ n }}"], default: "{{ n }}"}}', []),
         ('vars: [a]', [('wrong-type', '2:7', None)]),
     ],
 )

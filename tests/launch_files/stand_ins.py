@@ -208,6 +208,14 @@ class _Noting(dict):
         self._context.names.append(name)
         return super().__getitem__(name)
 
+    def __contains__(self, name):
+        self._context.names.append(name)
+        return super().__contains__(name)
+
+    def get(self, name):
+        self._context.names.append(name)
+        return super().get(name)
+
 
 class Loader:
     """As that of Composer, for descriptions that are there already."""

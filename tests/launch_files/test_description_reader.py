@@ -1,9 +1,6 @@
 """Launch descriptions → systems, with stand-ins for the objects of `launch`."""
 
 import os
-from functools import reduce
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 
 import pytest
@@ -12,8 +9,6 @@ import yaml
 from composer.errors import UsageError
 from composer.language.pipeline import load_system
 from composer.launch_files.description_reader import DescriptionReader
-from composer.launch_files.importing import joining_marks
-from composer.launch_files.marks import following_texts
 from composer.launch_files.place import Place
 from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
@@ -22,20 +17,18 @@ from tests.launch_files import stand_ins as launch
 
 SIDE = launch.LaunchConfiguration('side')
 SIM = launch.LaunchConfiguration('sim')
-ARGUMENTS = (
-    launch.DeclareLaunchArgument('side', 'left', 'Which one.', ('left', 'right')),
-    launch.DeclareLaunchArgument('sim', 'false'),
-)
 
 
 def python(*parts):
     return [each if not isinstance(each, str) else launch.TextSubstitution(each) for each in parts]
 
 
-def read(*entities, **given):
+def read(*entities, default='left', **given):
+    side = launch.DeclareLaunchArgument('side', default, 'Which one.', ('left', 'right'))
+    sim = launch.DeclareLaunchArgument('sim', 'false')
     place = Place(launch.Loader(), given)
-    DescriptionReader(place).read([launch.LaunchDescription([*ARGUMENTS, *entities])])
-    return render_system(place.result, 'x.launch.py', 'x')
+    DescriptionReader(place).read([launch.LaunchDescription([side, sim, *entities])])
+    return render_system(place.result, Path('x.launch.py'))
 
 
 def node(**keys):
@@ -79,7 +72,7 @@ def resolved(tmp_path, system, *words):
                     launch.PythonExpression(python("'", SIDE, "' == 'left' and not ", 'False'))
                 )
             ),
-            {'when': "{{ ((side == 'left') and (not false)) }}"},
+            {'when': "{{ (side == 'left' and (not False)) }}"},
         ),
         (launch.TimerAction(2.5, [node()]), {'delay': 2.5}),
         (
@@ -112,13 +105,6 @@ def resolved(tmp_path, system, *words):
                 ],
             ),
             {'arguments': ["{{ ('top' if sim | bool else side) }}"]},
-        ),
-        (node(arguments=[launch.Shouted('side')]), {'arguments': ['{{ side }}!']}),
-        (
-            launch.OpaqueFunction(
-                lambda context: [node(arguments=[context.launch_configurations['side']])]
-            ),
-            {'arguments': ['{{ side }}']},
         ),
     ],
 )
@@ -156,117 +142,88 @@ def test_a_condition_holds_for_what_launch_takes_for_true(tmp_path):
         assert len(resolved(tmp_path, system, f'sim:={text}')) == count
 
 
-def test_an_argument_that_decides_what_a_function_returns_cannot_change(tmp_path):
-    def decide(context):
-        is_left = context.launch_configurations['side'] == 'left'
-        return [node(name='left' if is_left else 'right')]
-
-    system = read(launch.OpaqueFunction(decide))
-    assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
-    assert '# line 1 of OpaqueFunction: OpaqueFunction was resolved' in system.text
+def decide(context):
+    is_left = context.launch_configurations['side'] == 'left'
+    return [node(name='left' if is_left else 'right', arguments=[SIM])]
 
 
-@pytest.mark.parametrize(
-    'test',
-    [
-        lambda text: text == 'race',
-        lambda text: text.lower() == 'race',
-        lambda text: text in ('race', 'x'),
-        {'race': True}.get,
-        lambda text: not text,
-        lambda text: 'race' in text,
-        lambda text: text.startswith('/'),
-        lambda text: os.path.splitext(text)[1],  # noqa: PTH122 - what launch files write
-        lambda text: os.path.exists(os.path.join('/etc', text)),  # noqa: PTH118 - too
-        lambda text: (Path('/etc') / text).exists(),
-        lambda text: text.isdigit(),
-    ],
-)
-def test_what_a_function_may_decide_otherwise_with_another_value_cannot_change(test):
-    def decide(context):
-        return [node()] if test(context.launch_configurations['side']) else []
+def change(context):
+    context.launch_configurations['sim'] = context.launch_configurations.get('side')
+    return [node(arguments=[SIM])]
 
-    with joining_marks():
-        system = read(launch.OpaqueFunction(decide))
-    assert yaml.safe_load(system.text)['args']['side']['choices'] == ['left']
+
+class Odd:
+    def evaluate(self, context):
+        return 'side' in context.launch_configurations
+
+
+class Own(launch.Entity):
+    def execute(self, context):
+        return [node(arguments=[each]) for each in context.launch_configurations['side'].split()]
 
 
 @pytest.mark.parametrize(
-    ('code', 'is_kept'),
+    ('entity', 'what', 'arguments'),
     [
-        ("f'{x}_x' == 'a_x'", False),
-        ("f'{x!r}' == 'a'", False),
-        ("'%s_x' % x == 'a_x'", False),
-        ("'{}_x'.format(x) == 'a_x'", False),
-        ("'_'.join([x, 'x']) == 'a_x'", False),
-        ("x + '_x' == 'a_x'", False),
-        ("f'{x}_x' in {'a_x'}", False),
-        ("x in 'abc'", False),
-        ("re.match('a', x)", False),
-        ("re.compile('a').search(f'{x}_')", False),
-        ("Path(x).suffix == '.a'", False),
-        ("PREFIXED(x).startswith('/a')", False),
-        ("[f'{x}_x', '%s' % x, '_'.join([x, 'x'])]", True),
+        (launch.OpaqueFunction(decide), 'OpaqueFunction decide', ['{{ sim }}']),
+        (launch.OpaqueFunction(change), 'OpaqueFunction change', ['right']),
+        (node(arguments=[launch.Shouted('side')]), 'Shouted', ['right!']),
+        (node(condition=Odd()), 'Odd', None),
+        (Own(), 'Own', ['right']),
     ],
 )
-def test_texts_that_a_launch_file_makes_and_compares_cannot_change(tmp_path, code, is_kept):
-    path = tmp_path / 'x.launch.py'
-    path.write_text(
-        'import re\nfrom pathlib import Path\n'
-        "PREFIXED = lambda text: f'/{text}'\ndef decide(x): return bool(CODE)\n".replace(
-            'CODE', code
-        )
+@pytest.mark.parametrize('given', [{'side': 'right'}, {}])
+def test_what_code_reads_is_fixed(tmp_path, entity, what, arguments, given):
+    """Another value is an error that has the command which imports again."""
+    system = read(entity, default='right', **given)
+    assert f'{what} was resolved for side:=right\n' in system.text
+    for words in ([], ['side:=right']):
+        (process,) = yaml.safe_load(system.text)['processes'].values()
+        assert process.get('arguments') == arguments
+        resolved(tmp_path, system, *words)
+    with pytest.raises(UsageError, match="'side': 'left' is not one of right") as caught:
+        resolved(tmp_path, system, 'side:=left')
+    assert (
+        'Which one. Fixed by the import. For another value: composer import' in caught.value.help
     )
-    with joining_marks(), following_texts():
-        loader = SourceFileLoader('python_launch_file', str(path))
-        module = module_from_spec(spec_from_loader(loader.name, loader))
-        loader.exec_module(module)
-        system = read(
-            launch.OpaqueFunction(
-                lambda context: [
-                    node(name=f'{module.decide(context.launch_configurations["side"])}')
-                ]
-            )
-        )
-    choices = yaml.safe_load(system.text)['args']['side']['choices']
-    assert choices == (['left', 'right'] if is_kept else ['left'])
+    assert 'x.launch.py side:=VALUE' in caught.value.help
+
+
+def test_a_fixed_argument_keeps_its_computed_default(tmp_path):
+    """Where a package is differs from machine to machine."""
+    map_file = launch.DeclareLaunchArgument('map', [SIDE, '.yaml'])
+    system = read(map_file, node(arguments=[launch.Shouted('map')]))
+    declared = yaml.safe_load(system.text)['args']
+    assert declared['map']['choices'] == [declared['map']['default']] == ['{{ side }}.yaml']
+    assert declared['side']['choices'] == ['left']
+    resolved(tmp_path, system)
+    with pytest.raises(UsageError, match="'map': 'x' is not one of"):
+        resolved(tmp_path, system, 'map:=x')
+
+
+def test_a_value_that_nothing_declares_may_have_been_read(tmp_path):
+    place = Place(launch.Loader(), {'robots': '3'})
+    DescriptionReader(place).read([node()])
+    place.declare_rest()
+    system = render_system(place.result, Path('x.launch.py'))
+    with pytest.raises(UsageError, match="'robots': '4' is not one of 3"):
+        resolved(tmp_path, system, 'robots:=4')
 
 
 @pytest.mark.parametrize('given', ['left', '/tmp/other', ''])
-@pytest.mark.parametrize(
-    'join',
-    [
-        lambda *parts: launch.PathJoinSubstitution(python(*parts)),
-        lambda *parts: Joining(os.path.join, parts),
-        lambda first, *others: Joining(
-            lambda *parts: reduce(lambda path, part: path / part, parts, Path(first)), others
-        ),
-    ],
-)
 @pytest.mark.parametrize('parts', [('/tmp/a', SIDE), ('/tmp/a', 'b', SIDE, 'c.yaml')])
-def test_an_absolute_argument_replaces_what_it_is_joined_to(tmp_path, join, parts, given):
-    with joining_marks():
-        place = Place(launch.Loader(), {})
-        entities = [launch.DeclareLaunchArgument('side', 'left'), node(arguments=[join(*parts)])]
-        DescriptionReader(place).read([launch.LaunchDescription(entities)])
-    system = render_system(place.result, 'x.launch.py', 'x', '/tmp/a')
+def test_an_absolute_argument_replaces_what_it_is_joined_to(tmp_path, parts, given):
+    place = Place(launch.Loader(), {})
+    path = launch.PathJoinSubstitution(python(*parts))
+    entities = [launch.DeclareLaunchArgument('side', 'left'), node(arguments=[path])]
+    DescriptionReader(place).read([launch.LaunchDescription(entities)])
+    system = render_system(place.result, Path('x.launch.py'), Path('/tmp/a/x.yaml'))
     (process,) = resolved(tmp_path, system, f'side:={given}').values()
     expected = os.path.join(*(given if each is SIDE else each for each in parts))  # noqa: PTH118
     start = str(tmp_path) if not given.startswith('/') else ''
     assert os.path.normpath(process.arguments[0]) == os.path.normpath(
         expected.replace('/tmp/a', start, 1) if start else expected
     )
-
-
-class Joining(launch.Substitution):
-    """A substitution of a launch file, which joins paths with a function."""
-
-    def __init__(self, function, parts):
-        self._function, self._parts = function, parts
-
-    def perform(self, context):
-        parts = (each if isinstance(each, str) else each.perform(context) for each in self._parts)
-        return str(self._function(*parts))
 
 
 def test_what_begins_when_another_ends_waits_for_it(tmp_path):
@@ -374,15 +331,6 @@ def test_a_configuration_that_nothing_declares_is_an_argument(tmp_path):
         assert process.arguments == (expected,)
 
 
-def test_what_depends_on_a_resolved_condition_cannot_change():
-    class Odd:
-        def evaluate(self, context):
-            return context.launch_configurations['sim'] == 'false'
-
-    system = read(node(condition=Odd()))
-    assert yaml.safe_load(system.text)['args']['sim']['choices'] == ['false']
-
-
 @pytest.mark.parametrize(
     'prefix', ["bash -c 'sleep 2.5; $0 $@'", """/bin/sh -c 'sleep 2.5 && exec "$0" "$@"'"""]
 )
@@ -406,7 +354,7 @@ def test_paths_below_the_folder_of_the_system_are_relative_to_it(tmp_path):
     place = Place(launch.Loader(), {})
     process = launch.ExecuteLocal([python(program), python(other)])
     DescriptionReader(place).read([launch.LaunchDescription([process])])
-    system = render_system(place.result, 'x.launch.py', 'x', str(tmp_path))
+    system = render_system(place.result, Path('x.launch.py'), tmp_path / 'x.yaml')
 
     (data,) = yaml.safe_load(system.text)['processes'].values()
     assert data['command'] == ['{{ here }}/parts/run.py', other]

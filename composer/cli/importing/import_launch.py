@@ -56,9 +56,7 @@ def import_launch_file(
         raise ComposerError(message)
     stem = output.stem if output else path.name.partition('.')[0]
     imported = import_file(path, given)
-    # Not `resolve`: launch leaves links in its paths.
-    folder = str(output.parent.absolute()) if output else None
-    system = render_system(imported, path.name, stem, folder)
+    system = render_system(imported, path, output)
     if output is not None:
         for written in _write(system, output):
             click.echo(f'wrote {written}', err=True)
@@ -67,7 +65,7 @@ def import_launch_file(
         if system.files:
             names = ', '.join(system.files)
             click.echo(f'{names}: parameter files of the system; -o writes them, too', err=True)
-    arguments = imported.words(given)
+    arguments = imported.words()
     with tempfile.TemporaryDirectory(prefix='composer-import-') as temporary:
         checked = output or Path(temporary) / f'{stem}.yaml'
         if output is None:
@@ -78,7 +76,7 @@ def import_launch_file(
         from composer.application.importing.verification import verify, without_launch_files
 
         copy = Path(temporary) / 'plain' / f'{stem}.yaml'
-        list(_write(render_system(without_launch_files(imported), path.name, stem), copy))
+        list(_write(render_system(without_launch_files(imported), path), copy))
         return verify(path, arguments, imported, copy)
 
 

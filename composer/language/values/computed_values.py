@@ -200,7 +200,9 @@ class _Computation:
                 raise StartError(message)
         if argument.type:
             value = convert_parameter_value(value, argument.type)
-        computed = replace(argument, default=value)
+        # A choice that is the default itself lets nobody give another value.
+        choices = (value if each == argument.default else each for each in argument.choices)
+        computed = replace(argument, default=value, choices=tuple(choices))
         problems = list(self._find_problems(computed))
         if problems:
             self._use_sample(argument.name)
