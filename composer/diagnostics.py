@@ -180,3 +180,12 @@ def errors_first(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Return whether any of the findings is an error."""
     return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
+
+
+def relative_path(name: str) -> str:
+    """Return a path relative to the working folder if it lies in it, with forward slashes."""
+    if name.startswith('<'):
+        return name
+    path = Path(os.path.abspath(name))  # noqa: PTH100 - `resolve` would follow links
+    folder = Path.cwd()
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()

@@ -34,14 +34,13 @@ ROOMS = (
         'inference',
         'checks',
         'planning',
-        'reports',
         'drawing',
         'executor',
         'processes',
         'runtime',
         'launch_files',
     ),
-    *('virtual_time', 'recordings', 'simulation', 'scenarios'),
+    *('virtual_time', 'recordings', 'simulation', 'scenarios', 'reports'),
     'stubs',
     *('export', 'hosts'),
     'application',
@@ -63,10 +62,8 @@ SHARED_NAMES = {
     'specs.py',  # the records that a file is parsed into
     'project_modules.py',  # as type checkers see them, and as simulations forget them
     'reading.py',  # what was read: of a behaviour, and of a system
-    'github.py',  # a form of reports: of findings, and of test runs
-    'junit.py',  # the same
-    'json_document.py',  # the same form, of findings, plans and drawings
-    'text.py',  # the same
+    'json_document.py',  # a form of reports, plans and drawings
+    'text.py',  # the same form, of reports and plans
 }
 MOST_FILES = 16
 

@@ -6,8 +6,8 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from composer.confidential import may_show_lines
+from composer.diagnostics import relative_path
 from composer.records import record
-from composer.reports.report import relative_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

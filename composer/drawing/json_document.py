@@ -39,7 +39,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from composer.reports.report import relative_path
+from composer.diagnostics import relative_path
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span

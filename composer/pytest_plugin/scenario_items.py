@@ -13,10 +13,9 @@ from composer.diagnostics import has_errors
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.pytest_plugin.case_clients import find_client
-from composer.reports.text import render_finding
+from composer.reports.report import CaseReport
+from composer.reports.text import render_failures, render_finding
 from composer.scenarios.checks import check_scenarios
-from composer.scenarios.reports.run_report import CaseReport
-from composer.scenarios.reports.text import render_failures
 from composer.scenarios.running.case_results import CaseRequest
 from composer.scenarios.scenario_files import load_scenarios
 

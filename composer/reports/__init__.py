@@ -1,4 +1,4 @@
-"""Reports of findings. Each format is a module with a `render_report`."""
+"""Reports of `composer check` and `composer test`: a module with a `render_report` each format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A report as workflow commands of GitHub Actions: each finding is an annotation of its line.
+"""A report as workflow commands of GitHub Actions: an annotation for each finding and failure.
 
 Source: https://docs.github.com/en/actions/reference/workflows-and-actions/workflow-commands and,
 for the escapes, `toolkit/packages/core/src/command.ts` of https://github.com/actions.
@@ -8,28 +8,37 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.reports.report import relative_path
-from composer.terminal import escape
+from composer.diagnostics import relative_path
+from composer.terminal import escape, escape_lines
 
 if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
-    from composer.reports.report import Report
+    from composer.reports.report import CaseReport, Report
+    from composer.scenarios.running.case_results import CaseFailure
 
 
 def render_report(report: Report) -> str:
-    """Return a command for each finding, a line each."""
-    return ''.join(f'{render_finding(finding)}\n' for finding in report.findings)
+    """Return a command for each finding, and each failure of a case, a line each."""
+    commands = [_render_finding(finding) for finding in report.findings]
+    for case in report.cases or ():
+        commands += [_render_failure(case, failure) for failure in case.shown.failures]
+    return ''.join(f'{command}\n' for command in commands)
 
 
-def render_finding(finding: Diagnostic) -> str:
-    """Return the command for a finding."""
+def _render_finding(finding: Diagnostic) -> str:
     message = escape(finding.message)
     if finding.help:
         message += f'\nhelp: {escape(finding.help)}'
-    return annotate(finding.severity.value, finding.file, finding.span, finding.rule, message)
+    return _annotate(finding.severity.value, finding.file, finding.span, finding.rule, message)
 
 
-def annotate(kind: str, file: str, span: Span | None, title: str, message: str) -> str:
+def _render_failure(case: CaseReport, failure: CaseFailure) -> str:
+    lines = [failure.message, *failure.difference, f'run it again: {case.command}']
+    message = escape_lines('\n'.join(lines))
+    return _annotate('error', case.file, failure.span or case.span, case.title, message)
+
+
+def _annotate(kind: str, file: str, span: Span | None, title: str, message: str) -> str:
     """Return the command that annotates a place.
 
     Args:

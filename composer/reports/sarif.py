@@ -11,7 +11,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from composer.reports.report import relative_path
+from composer.diagnostics import relative_path
 from composer.rules import load_rule
 from composer.rules.examples import load_example
 from composer.version import find_version

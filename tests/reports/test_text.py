@@ -2,6 +2,7 @@
 
 import pytest
 
+from composer.cli.main import run
 from composer.diagnostics import Diagnostic, SourceFile, Span, diagnostic_at
 from composer.reports.text import render_finding
 
@@ -56,3 +57,19 @@ def test_what_a_terminal_would_obey_is_escaped():
     lines = render_finding(finding).splitlines()
     assert lines[0] == r'a.yaml:1:1: error[bad-name]: one\n\x1b[31mtwo'
     assert lines[-1] == r"  help: write '\x07'"
+
+
+@pytest.mark.parametrize(
+    ('system', 'counted'),
+    [
+        ('nodes: {}', '0 nodes'),
+        ('processes: {a: {command: [sh]}}', '1 external process'),
+        ('processes: {a: {command: [sh]}, b: {command: [sh]}}', '2 external processes'),
+        ('nodes: {n: {}}\nprocesses: {a: {command: [sh]}}', '1 node'),
+    ],
+)
+def test_a_system_of_external_processes_alone_counts_these(tmp_path, capsys, system, counted):
+    (tmp_path / 'a.yaml').write_text(f'version: 1\n{system}\n')
+
+    assert run(['check', str(tmp_path / 'a.yaml')]) == 0
+    assert capsys.readouterr().out.endswith(f'a.yaml: ok, {counted}\n')

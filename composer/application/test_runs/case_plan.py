@@ -10,6 +10,7 @@ from composer.checks.absent_packages import AbsentPackages
 from composer.diagnostics import has_errors
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.records import record
+from composer.reports.report import CaseReport, CheckedFile
 from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
 
@@ -18,28 +19,6 @@ if TYPE_CHECKING:
 
     from composer.application.test_runs.name_expressions import Condition
     from composer.application.test_runs.scenario_selection import SelectedFile
-    from composer.diagnostics import Diagnostic, Span
-
-
-@record
-class PlannedCase:
-    """A case to run, or a file that has errors.
-
-    Attributes:
-        file: The scenario file, as the user named it.
-        name: The name of the case; empty for a file with errors.
-        findings: The errors of the file.
-    """
-
-    file: str
-    name: str = ''
-    span: Span | None = None
-    findings: tuple[Diagnostic, ...] = ()
-
-    @property
-    def title(self) -> str:
-        """`file::case`."""
-        return f'{self.file}::{self.name}'
 
 
 @record
@@ -47,12 +26,13 @@ class CasePlan:
     """What a run of `composer test` is to do.
 
     Attributes:
-        findings: What was found in all files, warnings included.
+        files: The scenario files, with all that was found in them.
+        cases: The cases to run, and the files that have errors.
         deselected: How many cases the names left out.
     """
 
-    cases: tuple[PlannedCase, ...]
-    findings: tuple[Diagnostic, ...]
+    files: tuple[CheckedFile, ...]
+    cases: tuple[CaseReport, ...]
     deselected: int
 
 
@@ -63,24 +43,24 @@ def plan_cases(files: Sequence[SelectedFile], is_meant: Condition) -> CasePlan:
         UsageError: A file lacks a case that is named.
     """
     catalogue, absent = InterfaceCatalogue(), AbsentPackages()
-    cases: list[PlannedCase] = []
-    findings: list[Diagnostic] = []
+    checked: list[CheckedFile] = []
+    cases: list[CaseReport] = []
     deselected = 0
     for file in files:
         loaded = load_scenarios(Path(file.name))
-        found = absent.leave_out(check_scenarios(loaded, catalogue))
-        findings += found
-        if has_errors(found):
-            cases.append(PlannedCase(file.name, findings=tuple(found)))
-            continue
+        findings = tuple(absent.leave_out(check_scenarios(loaded, catalogue)))
         named = loaded.spec.cases if loaded.spec else {}
+        checked.append(CheckedFile(file.name, findings, cases=len(named)))
+        if has_errors(findings):
+            cases.append(CaseReport(file.name, findings=findings))
+            continue
         check_case_names(file, list(named))
         for name, case in named.items():
             if file.cases and name not in file.cases:
                 continue
-            planned = PlannedCase(file.name, name, loaded.positions.key(case.path))
+            planned = CaseReport(file.name, name, loaded.positions.key(case.path))
             if is_meant(planned.title):
                 cases.append(planned)
             else:
                 deselected += 1
-    return CasePlan(tuple(cases), tuple(findings), deselected)
+    return CasePlan(tuple(checked), tuple(cases), deselected)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from composer.scenarios.reports.run_report import Attempt, CaseReport
+from composer.reports.report import Attempt
 from composer.scenarios.running.case_results import CaseRequest, CaseResult
 from composer.scenarios.running.orders import compare_orders
 
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from composer.application.test_runs.case_plan import PlannedCase
     from composer.application.test_runs.run_options import RunOptions
+    from composer.reports.report import CaseReport
     from composer.scenarios.running.case_client import CaseClient
 
 
@@ -30,7 +31,7 @@ class CaseRuns:
     def __init__(
         self,
         client: CaseClient,
-        cases: Sequence[PlannedCase],
+        cases: Sequence[CaseReport],
         options: RunOptions,
         folder: Path,
     ) -> None:
@@ -95,20 +96,17 @@ class CaseRuns:
             self.reports.append(report)
             yield report
 
-    def _report(self, index: int, case: PlannedCase, results: dict[int, CaseResult]) -> CaseReport:
+    def _report(self, index: int, case: CaseReport, results: dict[int, CaseResult]) -> CaseReport:
         attempts = []
         for attempt in range(1, 1 + self._options.shuffles if case.name else 1):
             traces = self._trace(index, 0), self._trace(index, attempt)
             difference = compare_orders(*traces, results[attempt].seed)
-            attempts.append(Attempt(results[attempt], difference, differs=bool(difference)))
+            attempts.append(Attempt(results[attempt], difference))
             if self._options.trace is None:
                 traces[1].unlink(missing_ok=True)
-        return CaseReport(
-            file=case.file,
-            name=case.name,
-            span=case.span,
-            result=results.get(0) or CaseResult(),
+        return replace(
+            case,
+            result=results.get(0, case.result),
             attempts=tuple(attempts),
             limit_sec=self._options.limit_sec,
-            findings=case.findings,
         )

@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING
 import click
 
 from composer import signals
-from composer.application.output import wants_colour, write_file
+from composer.application.output import show_findings, wants_colour, write_file
 from composer.application.test_runs.case_plan import plan_cases
 from composer.application.test_runs.case_runs import CaseRuns
 from composer.application.test_runs.name_expressions import parse_name_expression
 from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN, select_scenarios
 from composer.errors import ExitCode
-from composer.reports.text import render_finding
+from composer.reports import render_report
+from composer.reports.report import Report
+from composer.reports.text import render_case, render_end
 from composer.runtime.environment import check_ros, find_colour
-from composer.scenarios.reports import render_report
-from composer.scenarios.reports.run_report import RunReport
-from composer.scenarios.reports.text import render_case, render_end
 from composer.scenarios.running.case_client import CaseClient
 from composer.terminal import escape
 
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from composer.application.test_runs.case_plan import CasePlan
     from composer.application.test_runs.name_expressions import Condition
     from composer.application.test_runs.run_options import RunOptions
-    from composer.scenarios.reports.run_report import CaseReport
+    from composer.reports.report import CaseReport
 
 
 def run_tests(words: Sequence[str], options: RunOptions) -> int:
@@ -86,35 +85,35 @@ def _run(
 def _show_warnings(plan: CasePlan, options: RunOptions) -> None:
     """Print the findings of files without errors; errors are shown as failures."""
     failed = {finding.sort_key for case in plan.cases for finding in case.findings}
-    colour = wants_colour(is_error=True)
-    for finding in plan.findings:
-        if finding.sort_key not in failed and not options.is_quiet:
-            click.echo(render_finding(finding, colour=colour) + '\n', err=True, color=colour)
+    findings = [] if options.is_quiet else Report(plan.files).findings
+    show_findings(finding for finding in findings if finding.sort_key not in failed)
 
 
 def _show_case(report: CaseReport, options: RunOptions) -> None:
     if options.format == 'json' or options.is_quiet:
         return
     colour = wants_colour()
-    text = render_case(report, colour=colour, is_verbose=options.is_verbose)
-    click.echo(text, color=colour)
+    click.echo(render_case(report, colour=colour, is_verbose=options.is_verbose), color=colour)
 
 
 def _report(
     cases: Sequence[CaseReport], plan: CasePlan, options: RunOptions, started: float, end: str
-) -> RunReport:
+) -> Report:
     """Write all reports at the end; return what they show."""
-    report = RunReport(tuple(cases), plan.findings, plan.deselected, monotonic() - started, end)
+    report = Report(
+        plan.files,
+        cases=tuple(cases),
+        deselected=plan.deselected,
+        real_sec=monotonic() - started,
+        end=end,
+    )
     if options.format == 'json':
         click.echo(render_report(report, 'json'), nl=False)
     else:
         colour = wants_colour()
-        click.echo('\n'.join(render_end(report, colour=colour)), color=colour)
+        click.echo(render_end(report, colour=colour), color=colour)
     if options.format == 'github':
-        from composer.scenarios.reports.github import list_commands
-
-        for line in list_commands(report):
-            click.echo(line, color=False)
+        click.echo(render_report(report, 'github'), nl=False, color=False)
     if options.junit:
         write_file(options.junit, render_report(report, 'junit'), 'the report')
     return report
