@@ -7,7 +7,7 @@ PYTHON ?= python3
 WORKERS ?= 4
 VENV := .venv
 ifdef ROS_DISTRO
-EXTRAS := graph,hosts,dev
+EXTRAS := record,graph,hosts,dev
 VENV_FLAGS := --system-site-packages
 else ifeq ($(ROS),kilted)
 VENV := .venv-kilted

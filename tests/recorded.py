@@ -81,5 +81,7 @@ def write_recording(path, topics, *, chunks=1, closes=True):
             if number % size == size - 1:
                 writer.flush()
         if closes:
-            writer.finish()
+            writer.finish({})
+        else:
+            writer.flush()
     return path

@@ -1,4 +1,8 @@
-"""Read one MCAP file with the library `mcap`, which this imports when it is needed."""
+"""Read one MCAP file with the library `mcap`.
+
+Its readers believe what chunks say about their size, and hold all records of one at once. So only
+its parser of records is used here: files of anybody are read in bounded memory.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,14 @@ import struct
 import zlib
 from collections import Counter
 from contextlib import contextmanager, suppress
-from typing import IO, TYPE_CHECKING, Any, Final, cast
+from typing import IO, TYPE_CHECKING, Final, cast
+
+import lz4.frame
+import zstandard
+from mcap.exceptions import EndOfFile, McapError
+from mcap.records import Channel, Chunk, ChunkIndex, Footer, Message, Schema, Statistics
+from mcap.stream_reader import StreamReader
+from mcap.summary import Summary
 
 from composer.input_limits import (
     BYTES_OF_RECORDED_VALUE,
@@ -32,8 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from mcap.records import Channel, Chunk, Schema
-    from mcap.summary import Summary
+    from mcap.records import McapRecord
 
 # A message of a chunk, beside its data.
 _BYTES_OF_MESSAGE: Final = 500
@@ -42,8 +52,21 @@ _MOST_HELD: Final = 4 * MAX_RECORDED_BYTES
 # The year 2262; ROS has no later time.
 _LAST_NS: Final = 2**63 - 1
 _MAGIC: Final = b'\x89MCAP0\r\n'
+# A complete file ends with a record of 29 bytes and the magic.
+_END_BYTES: Final = 29 + len(_MAGIC)
 # What follows the kind of a record.
 _LENGTH_BYTES: Final = 8
+# What the library and its decompressors raise; errors of lz4 are RuntimeErrors.
+_DAMAGES: Final = (
+    McapError,
+    zstandard.ZstdError,
+    struct.error,
+    ArithmeticError,
+    ValueError,
+    LookupError,
+    RuntimeError,
+    MemoryError,
+)
 
 
 @record
@@ -63,7 +86,7 @@ class FileContent:
 
 
 class Budget:
-    """How much is read of recordings.
+    """How much is read and decompressed of recordings.
 
     Args:
         left: In bytes; `None` for as much as there is.
@@ -73,7 +96,7 @@ class Budget:
         self._left = left
 
     def spend(self, size: int) -> None:
-        """Count what is read.
+        """Count what is read or decompressed.
 
         Raises:
             RecordingError: It is too much.
@@ -93,14 +116,18 @@ class Budget:
 
 
 class _Counted(io.BufferedIOBase):
-    """A stream of which no more is read than a budget allows."""
+    """A stream of which no more is read than a budget allows.
 
-    def __init__(self, stream: IO[bytes], budget: Budget) -> None:
-        self._stream, self._budget = stream, budget
+    Args:
+        is_chunk: Whether its bytes are those of a chunk, which are counted already.
+    """
+
+    def __init__(self, stream: IO[bytes], budget: Budget, *, is_chunk: bool = False) -> None:
+        self._stream, self._budget, self._is_chunk = stream, budget, is_chunk
 
     def read(self, size: int | None = None, /) -> bytes:
         size = -1 if size is None else size
-        self._budget.spend(size)
+        self._budget.spend(min(size, 0) if self._is_chunk else size)
         data = self._stream.read(size)
         if data == b'\0':
             rest = self._stream.read(_LENGTH_BYTES)
@@ -113,243 +140,178 @@ class _Counted(io.BufferedIOBase):
         return self._stream.seek(offset, whence)
 
 
-def read_content(path: Path, budget: Budget | None = None) -> FileContent:
-    """Read what a file has, but not its messages, unless it has no summary.
+def read_content(path: Path, budget: Budget) -> FileContent:
+    """Read what a file has, but not its messages, unless it has no index.
 
     Raises:
         RecordingError: It cannot be read, or is of another kind, or damaged; or the budget is
             spent.
     """
-    from mcap.reader import SeekingReader
-
-    budget = budget or Budget()
     with _reading(path, budget) as stream:
-        _check_magic(path, stream)
-        summary = SeekingReader(stream).get_summary() if _has_end(stream) else None
-        if summary is None or not (summary.statistics or summary.chunk_indexes):
-            stream.seek(0)
+        summary = _read_summary(stream)
+        if summary is None:
             return _scan(path, stream, budget)
-        statistics, chunks = summary.statistics, summary.chunk_indexes
         counts: dict[int, int] | None = None
-        start_ns = min((each.message_start_time for each in chunks), default=0)
-        end_ns = max((each.message_end_time for each in chunks), default=0)
-        if statistics is not None:
-            counts = statistics.channel_message_counts
-            start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
-        topics = _describe_topics(summary.channels, summary.schemas, counts)
-        return FileContent(topics, start_ns, end_ns)
-
-
-def _scan(path: Path, stream: IO[bytes], budget: Budget) -> FileContent:
-    """Read all of a file that has no summary, up to where it ends."""
-    from mcap.records import Channel, Message, Schema
-
-    channels: dict[int, Channel] = {}
-    schemas: dict[int, Schema] = {}
-    counts: Counter[int] = Counter()
-    start_ns, end_ns = 0, 0
-    problems: list[str] = []
-    for each in _stream_records(path, stream, problems, budget):
-        if isinstance(each, Channel):
-            channels.setdefault(each.id, each)
-        elif isinstance(each, Schema):
-            schemas.setdefault(each.id, each)
-        elif isinstance(each, Message):
-            counts[each.channel_id] += 1
-            start_ns = min(start_ns or each.log_time, each.log_time)
-            end_ns = max(end_ns, each.log_time)
-    topics = _describe_topics(channels, schemas, counts)
-    return FileContent(topics, start_ns, end_ns, ''.join(problems))
-
-
-def _describe_topics(
-    channels: Mapping[int, Channel],
-    schemas: Mapping[int, Schema],
-    counts: Mapping[int, int] | None,
-) -> list[RecordedTopic]:
-    found: dict[tuple[str, str], RecordedTopic] = {}
-    # Many topics may have the same one.
-    definitions = {
-        number: each.data.decode(errors='replace')
-        for number, each in schemas.items()
-        if each.encoding == 'ros2msg'
-    }
-    for number, channel in channels.items():
-        count = None if counts is None else counts.get(number, 0)
-        definition = definitions.get(channel.schema_id, '')
-        topic = _describe_topic(channel, schemas.get(channel.schema_id), definition, count)
-        key = topic.name, topic.type
-        found[key] = joined(found[key], topic) if key in found else topic
-    return list(found.values())
-
-
-def _describe_topic(
-    channel: Channel, schema: Schema | None, definition: str, count: int | None
-) -> RecordedTopic:
-    encoding = channel.message_encoding
-    type_name = full_type_name(schema.name if schema else '')
-    problem = find_topic_name_problem(channel.topic) or ''
-    if encoding != 'cdr':
-        problem = f"its messages are in '{encoding}', not in the 'cdr' of ROS 2"
-    elif not type_name:
-        named = schema.name if schema else ''
-        problem = f"'{named}' is no type of ROS" if named else 'its type was not recorded'
-    return RecordedTopic(
-        channel.topic,
-        type_name or (schema.name if schema else ''),
-        count,
-        channel.metadata.get(metadata.QOS_KEY, ''),
-        definition,
-        channel.metadata.get(metadata.HASH_KEY, ''),
-        problem,
-    )
+        start_ns = min((index.message_start_time for index in summary.chunk_indexes), default=0)
+        end_ns = max((index.message_end_time for index in summary.chunk_indexes), default=0)
+        if summary.statistics:
+            counts = summary.statistics.channel_message_counts
+            start_ns = summary.statistics.message_start_time
+            end_ns = summary.statistics.message_end_time
+        return FileContent(_describe_topics(summary, counts), start_ns, end_ns)
 
 
 def read_messages(
     path: Path,
     known: Mapping[tuple[str, str], RecordedTopic],
     topics: Collection[str] | None,
-    since_ns: int | None,
+    since_ns: int,
 ) -> Iterator[RawMessage]:
     """Yield the messages of a file, if their topics are known and wanted; see `Recording`.
 
     Raises:
         RecordingError: It cannot be read, or is damaged.
     """
-    wanted = {name for name, _ in known} if topics is None else set(topics)
+    wanted = {key: known[key] for key in known if topics is None or key[0] in topics}
     with _reading(path, Budget()) as stream:
-        for schema, channel, message in _iterate(path, stream, wanted, since_ns or 0):
-            name = full_type_name(schema.name if schema else '')
-            topic = known.get((channel.topic, name))
-            if topic is not None and message.log_time > _LAST_NS:
+        summary = _read_summary(stream)
+        if summary and summary.chunk_indexes:
+            messages = _sort_messages(path, stream, summary, wanted, since_ns)
+        else:
+            # In the order of the file: to sort them would take all in memory.
+            summary = Summary()
+            messages = _stream_messages(path, stream, summary, [], Budget())
+        for message in messages:
+            topic = _find_topic(summary, message.channel_id, wanted)
+            if topic is None or message.log_time < since_ns:
+                continue
+            if message.log_time > _LAST_NS:
                 text = f"'{path}' has a message of '{topic.name}' at a time after the year 2262"
                 raise RecordingError(text)
-            if topic is not None:
-                yield RawMessage(message.log_time, topic, message.data)
+            yield RawMessage(message.log_time, topic, message.data)
 
 
-def _iterate(
-    path: Path, stream: IO[bytes], wanted: set[str], since_ns: int
-) -> Iterator[tuple[Any, Any, Any]]:
-    from mcap.reader import SeekingReader
+def _read_summary(stream: IO[bytes]) -> Summary | None:
+    """Return the summary of a complete file; `None` if there is none, at the file's beginning."""
+    size = stream.seek(0, io.SEEK_END)
+    stream.seek(max(0, size - _END_BYTES))
+    ending = stream.read(_END_BYTES)
+    stream.seek(0)
+    if len(ending) < _END_BYTES or not ending.endswith(_MAGIC):
+        return None
+    footer = next(StreamReader(io.BytesIO(ending), skip_magic=True, emit_chunks=True).records)
+    if not isinstance(footer, Footer) or not footer.summary_start:
+        return None
+    stream.seek(footer.summary_start)
+    summary = Summary()
+    # A summary that names the chunks themselves is not to decompress them.
+    for entry in StreamReader(stream, skip_magic=True, emit_chunks=True).records:
+        _note(summary, entry)
+    stream.seek(0)
+    return summary if summary.statistics or summary.chunk_indexes else None
 
-    summary = SeekingReader(stream).get_summary() if _has_end(stream) else None
-    if summary is not None and summary.chunk_indexes:
-        yield from _iterate_indexed(path, stream, summary, wanted, since_ns)
-    else:
-        stream.seek(0)
-        yield from _iterate_unindexed(path, stream, wanted, since_ns)
+
+def _note(summary: Summary, entry: McapRecord) -> None:
+    if isinstance(entry, Channel):
+        summary.channels.setdefault(entry.id, entry)
+    elif isinstance(entry, Schema):
+        summary.schemas.setdefault(entry.id, entry)
+    elif isinstance(entry, ChunkIndex):
+        summary.chunk_indexes.append(entry)
+    elif isinstance(entry, Statistics):
+        summary.statistics = entry
 
 
-def _iterate_indexed(
-    path: Path, stream: IO[bytes], summary: Summary, wanted: set[str], since_ns: int
-) -> Iterator[tuple[Any, Any, Any]]:
+def _scan(path: Path, stream: IO[bytes], budget: Budget) -> FileContent:
+    """Read all of a file that has no index, up to where it ends."""
+    summary, problems = Summary(), list[str]()
+    counts: Counter[int] = Counter()
+    start_ns, end_ns = 0, 0
+    for message in _stream_messages(path, stream, summary, problems, budget):
+        counts[message.channel_id] += 1
+        start_ns = min(start_ns or message.log_time, message.log_time)
+        end_ns = max(end_ns, message.log_time)
+    return FileContent(_describe_topics(summary, counts), start_ns, end_ns, ''.join(problems))
+
+
+def _stream_messages(
+    path: Path, stream: IO[bytes], summary: Summary, problems: list[str], budget: Budget
+) -> Iterator[Message]:
+    """Yield the messages of a file as they come; note its topics, and if it ends too early."""
+    entries = StreamReader(stream, validate_crcs=True, emit_chunks=True).records
+    while True:
+        try:
+            entry = next(entries, None)
+        except (EndOfFile, struct.error):
+            why = 'its recorder was killed, or its disk was full'
+            problems.append(f"'{path}' was not completed: {why}")
+            return
+        if entry is None:
+            return
+        for part in _unpack(entry, budget) if isinstance(entry, Chunk) else [entry]:
+            if isinstance(part, Message):
+                yield part
+            else:
+                _note(summary, part)
+
+
+def _sort_messages(
+    path: Path,
+    stream: IO[bytes],
+    summary: Summary,
+    wanted: Mapping[tuple[str, str], RecordedTopic],
+    since_ns: int,
+) -> Iterator[Message]:
     """Yield messages in the order of their times, holding no more chunks than have the same."""
-    from mcap.records import Chunk, Message
-    from mcap.stream_reader import StreamReader
-
-    ids = {number for number, each in summary.channels.items() if each.topic in wanted}
-    chunks = {each.chunk_start_offset: each for each in summary.chunk_indexes}
-    queue: list[tuple[int, int, int, Message | None]] = [
-        (each.message_start_time, offset, -1, None)
-        for offset, each in chunks.items()
-        if each.message_end_time >= since_ns
-        and not (each.message_index_offsets and ids.isdisjoint(each.message_index_offsets))
-    ]
-    heapq.heapify(queue)
-    held = 0
-    while queue:
-        _, offset, _, message = heapq.heappop(queue)
-        if message is not None:
-            held -= len(message.data) + _BYTES_OF_MESSAGE
-            channel = summary.channels[message.channel_id]
-            yield summary.schemas.get(channel.schema_id), channel, message
+    numbers = {each for each in summary.channels if _find_topic(summary, each, wanted)}
+    chunks = {index.chunk_start_offset: index for index in summary.chunk_indexes}
+    held: list[tuple[int, int, int, Message]] = []
+    size = 0
+    for offset, index in sorted(chunks.items(), key=lambda item: item[1].message_start_time):
+        offsets = index.message_index_offsets
+        if index.message_end_time < since_ns or (offsets and numbers.isdisjoint(offsets)):
             continue
+        while held and held[0][0] < index.message_start_time:
+            message = heapq.heappop(held)[-1]
+            size -= len(message.data) + _BYTES_OF_MESSAGE
+            yield message
         stream.seek(offset)
         chunk = next(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
         if not isinstance(chunk, Chunk):
             text = 'its index names a chunk that is none'
             raise ValueError(text)  # noqa: TRY004 - a damage
-        for index, each in enumerate(_unpack(chunk, Budget())):
-            if isinstance(each, Message) and each.channel_id in ids and each.log_time >= since_ns:
-                held += len(each.data) + _BYTES_OF_MESSAGE
-                heapq.heappush(queue, (each.log_time, offset, index, each))
-                if held > _MOST_HELD:
-                    size = format_size(_MOST_HELD)
-                    text = f"'{path}' has more than {size} in chunks of the same time"
-                    raise RecordingError(text, help="'mcap sort' puts them in order")
+        for place, part in enumerate(_unpack(chunk, Budget())):
+            if isinstance(part, Message) and part.channel_id in numbers:
+                heapq.heappush(held, (part.log_time, offset, place, part))
+                size += len(part.data) + _BYTES_OF_MESSAGE
+            if size > _MOST_HELD:
+                text = f"'{path}' has more than {format_size(_MOST_HELD)} in chunks of one time"
+                raise RecordingError(text, help="'mcap sort' puts them in order")
+    while held:
+        yield heapq.heappop(held)[-1]
 
 
-def _iterate_unindexed(
-    path: Path, stream: IO[bytes], wanted: set[str], since_ns: int
-) -> Iterator[tuple[Any, Any, Any]]:
-    """Yield messages in the order of the file: to sort them would take all in memory."""
-    from mcap.records import Channel, Message, Schema
-
-    channels: dict[int, Channel] = {}
-    schemas: dict[int, Schema] = {}
-    for each in _stream_records(path, stream, [], Budget()):
-        if isinstance(each, Channel):
-            channels.setdefault(each.id, each)
-        elif isinstance(each, Schema):
-            schemas.setdefault(each.id, each)
-        elif isinstance(each, Message) and each.log_time >= since_ns:
-            channel = channels[each.channel_id]
-            if channel.topic in wanted:
-                yield schemas.get(channel.schema_id), channel, each
-
-
-def _stream_records(
-    path: Path, stream: IO[bytes], problems: list[str], budget: Budget
-) -> Iterator[Any]:
-    """Yield the records of a file one after the other; note if it ends too early."""
-    from mcap.records import Chunk
-    from mcap.stream_reader import StreamReader
-
-    records = StreamReader(stream, validate_crcs=True, emit_chunks=True).records
-    while True:
-        try:
-            each = next(records)
-        except StopIteration:
-            return
-        except _early_ends():
-            problems.append(f"'{path}' was not completed: its recorder was killed")
-            return
-        yield from _unpack(each, budget) if isinstance(each, Chunk) else [each]
-
-
-def _unpack(chunk: Chunk, budget: Budget) -> Iterator[Any]:
-    """Yield the records of a chunk.
-
-    The library believes what a chunk says about its size, and holds all its records at once.
-    """
-    from mcap.exceptions import EndOfFile
-    from mcap.stream_reader import StreamReader
-
-    data = _decompress(chunk)
+def _unpack(chunk: Chunk, budget: Budget) -> Iterator[McapRecord]:
+    """Yield the records of a chunk."""
+    data = chunk.data
+    if chunk.compression:
+        budget.spend(chunk.uncompressed_size)
+        data = _decompress(chunk, chunk.uncompressed_size)
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         message = 'crc validation failed in a chunk'
         raise ValueError(message)
-    stream = cast('IO[bytes]', _Counted(io.BytesIO(data), budget))
+    stream = cast('IO[bytes]', _Counted(io.BytesIO(data), budget, is_chunk=True))
     with suppress(EndOfFile):
         yield from StreamReader(stream, skip_magic=True, emit_chunks=True).records
 
 
-def _decompress(chunk: Chunk) -> bytes:
-    size = chunk.uncompressed_size
-    if max(size, len(chunk.data)) > MAX_RECORDED_BYTES:
-        message = f'a chunk has more than {format_size(MAX_RECORDED_BYTES)}'
-        raise ValueError(message)
-    data = chunk.data
+def _decompress(chunk: Chunk, size: int) -> bytes:
+    data: bytes
     if chunk.compression == 'zstd':
-        import zstandard
-
-        data = zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+        data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
     elif chunk.compression == 'lz4':
-        import lz4.frame
-
-        data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
-    elif chunk.compression:
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, size + 1)
+    else:
         message = f"a chunk is compressed as '{chunk.compression}'"
         raise ValueError(message)
     if len(data) > size:
@@ -358,28 +320,74 @@ def _decompress(chunk: Chunk) -> bytes:
     return data
 
 
-def _early_ends() -> tuple[type[Exception], ...]:
-    """Return what the library raises where a file ends within a record."""
-    from mcap.exceptions import EndOfFile
-
-    return EndOfFile, struct.error
-
-
-def _has_end(stream: IO[bytes]) -> bool:
-    """Return whether a file was completed; otherwise its last bytes are anything."""
-    size = stream.seek(0, io.SEEK_END)
-    stream.seek(max(0, size - len(_MAGIC)))
-    ending = stream.read(len(_MAGIC))
-    stream.seek(0)
-    return ending == _MAGIC and size > len(_MAGIC)
+def _find_topic(
+    summary: Summary, number: int, wanted: Mapping[tuple[str, str], RecordedTopic]
+) -> RecordedTopic | None:
+    channel = summary.channels[number]
+    schema = summary.schemas.get(channel.schema_id)
+    return wanted.get((channel.topic, full_type_name(schema.name if schema else '')))
 
 
-def _check_magic(path: Path, stream: IO[bytes]) -> None:
-    beginning = stream.read(len(_MAGIC))
-    stream.seek(0)
-    if beginning != _MAGIC:
-        message = f"'{path}' is no MCAP file"
-        raise RecordingError(message, help=_advice(path))
+def _describe_topics(
+    summary: Summary, counts: Mapping[int, int] | None
+) -> Sequence[RecordedTopic]:
+    topics: dict[tuple[str, str], RecordedTopic] = {}
+    # Many topics may have the same one.
+    definitions = {
+        number: schema.data.decode(errors='replace')
+        for number, schema in summary.schemas.items()
+        if schema.encoding == 'ros2msg'
+    }
+    for number, channel in summary.channels.items():
+        count = None if counts is None else counts.get(number, 0)
+        schema = summary.schemas.get(channel.schema_id)
+        definition = definitions.get(channel.schema_id, '')
+        topic = _describe_topic(channel, schema.name if schema else '', definition, count)
+        key = topic.name, topic.type
+        topics[key] = joined(topics[key], topic) if key in topics else topic
+    return list(topics.values())
+
+
+def _describe_topic(
+    channel: Channel, named: str, definition: str, count: int | None
+) -> RecordedTopic:
+    type_name = full_type_name(named)
+    problem = find_topic_name_problem(channel.topic) or ''
+    if channel.message_encoding != 'cdr':
+        problem = f"its messages are in '{channel.message_encoding}', not in the 'cdr' of ROS 2"
+    elif not type_name:
+        problem = f"'{named}' is no type of ROS" if named else 'its type was not recorded'
+    return RecordedTopic(
+        channel.topic,
+        type_name or named,
+        count,
+        channel.metadata.get(metadata.QOS_KEY, ''),
+        definition,
+        channel.metadata.get(metadata.HASH_KEY, ''),
+        problem,
+    )
+
+
+@contextmanager
+def _reading(path: Path, budget: Budget) -> Iterator[IO[bytes]]:
+    """Open a file; what goes wrong with it in the block is a `RecordingError`."""
+    try:
+        with open_file(path) as stream:
+            if stream.read(len(_MAGIC)) != _MAGIC:
+                message = f"'{path}' is no MCAP file"
+                raise RecordingError(message, help=_advice(path))
+            yield cast('IO[bytes]', _Counted(stream, budget))
+    except UnreadableFileError as error:
+        message = f"'{path}': {error}"
+        raise RecordingError(message) from error
+    except OSError as error:
+        message = f"'{path}' cannot be read: {error.strerror or error}"
+        raise RecordingError(message) from error
+    except _DAMAGES as error:
+        # Errors of memory, and of an end, have no text.
+        lack = 'too little memory' if isinstance(error, MemoryError) else 'a record ends too early'
+        message = f"'{path}' is damaged: {str(error) or lack}"
+        raise RecordingError(message, help="'mcap recover' saves what can be read") from error
 
 
 def _advice(path: Path) -> str | None:
@@ -388,41 +396,3 @@ def _advice(path: Path) -> str | None:
     if path.suffix in {'.bag', '.db3'}:
         return "'rosbags-convert' of the package rosbags makes MCAP of it"
     return None
-
-
-@contextmanager
-def _reading(path: Path, budget: Budget) -> Iterator[IO[bytes]]:
-    """Open a file; what goes wrong with it in the block is a `RecordingError`."""
-    from mcap.exceptions import McapError
-
-    try:
-        with open_file(path) as stream:
-            yield cast('IO[bytes]', _Counted(stream, budget))
-    except UnreadableFileError as error:
-        message = f"'{path}': {error}"
-        raise RecordingError(message) from error
-    except OSError as error:
-        message = f"'{path}' cannot be read: {error.strerror or error}"
-        raise RecordingError(message) from error
-    except Exception as error:
-        if not isinstance(error, (McapError, *_damages())):
-            raise
-        message = f"'{path}' is damaged: {error}"
-        raise RecordingError(message, help="'mcap recover' saves what can be read") from error
-
-
-def _damages() -> tuple[type[Exception], ...]:
-    """Return what the library and its decompressors raise where a file is damaged."""
-    import zstandard
-
-    # Errors of lz4 are RuntimeErrors; those of a CRC are ValueErrors.
-    broken: type[Exception] = zstandard.ZstdError
-    return (
-        broken,
-        struct.error,
-        ArithmeticError,
-        ValueError,
-        LookupError,
-        RuntimeError,
-        MemoryError,
-    )

@@ -148,13 +148,12 @@ def describe_recording(writer: McapWriter, file_name: str) -> dict[str, Any]:
 
 
 def _describe_topic(channel: Channel) -> dict[str, Any]:
-    about = channel.record.metadata if channel.record else {}
     return {
         'name': channel.topic,
-        'type': channel.schema.name if channel.schema else '',
+        'type': channel.type_name,
         'serialization_format': 'cdr',
-        'offered_qos_profiles': yaml.safe_load(about.get(QOS_KEY, '')) or [],
-        'type_description_hash': about.get(HASH_KEY, ''),
+        'offered_qos_profiles': yaml.safe_load(channel.about.get(QOS_KEY, '')) or [],
+        'type_description_hash': channel.about.get(HASH_KEY, ''),
     }
 
 

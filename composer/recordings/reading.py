@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from composer.input_limits import MAX_SCANNED_BYTES, UnreadableFileError, read_file
 from composer.recordings import metadata
-from composer.recordings.mcap_reader import Budget, read_content, read_messages
-from composer.recordings.recorded_topics import RawMessage, RecordedTopic, RecordingError, joined
+from composer.recordings.recorded_topics import (
+    RawMessage,
+    RecordedTopic,
+    RecordingError,
+    joined,
+    require_mcap,
+)
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -34,8 +39,8 @@ class Recording:
         topics: Sorted by name.
         start_ns: The time of its first message; 0 if there is none.
         end_ns: That of the last one.
-        problem: Why it ends too early, as it does if its recorder was killed; empty if it does
-            not.
+        problem: Why it ends too early, as it does if its recorder was killed or its disk was
+            full; empty if it does not.
     """
 
     path: Path
@@ -58,9 +63,11 @@ class Recording:
             RecordingError: The file is damaged, or cannot be read any more. One that only ends
                 too early does not raise.
         """
+        from composer.recordings.mcap_reader import read_messages
+
         known = {(each.name, each.type): each for each in self.topics if not each.problem}
         for path in self.files:
-            yield from read_messages(path, known, topics, since_ns)
+            yield from read_messages(path, known, topics, since_ns or 0)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[int, str, Any]]:
         """Yield time (ns), topic and message, decoded; see `raw_messages`.
@@ -87,8 +94,12 @@ def read_recording(path: str | Path, *, is_bounded: bool = False) -> Recording:
         is_bounded: Whether it is an error if that takes longer than seconds.
 
     Raises:
-        RecordingError: There is none, or it is of another kind, or damaged.
+        RecordingError: There is none, or it is of another kind, or damaged; or the library for
+            recordings is not installed.
     """
+    require_mcap()
+    from composer.recordings.mcap_reader import Budget, read_content
+
     path = Path(path)
     files = _list_files(path)
     budget = Budget(MAX_SCANNED_BYTES if is_bounded else None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from composer.errors import ComposerError
@@ -20,6 +21,17 @@ _TYPE_NAME: Final = re.compile(rf'({_NAME})(?:/(msg|srv|action))?/({_NAME})', re
 
 class RecordingError(ComposerError):
     """A recording cannot be read, or not on."""
+
+
+def require_mcap() -> None:
+    """Do nothing if the library for recordings is installed.
+
+    Raises:
+        RecordingError: It is not.
+    """
+    if find_spec('mcap') is None:
+        message = 'recordings need the package mcap, which is not installed'
+        raise RecordingError(message, help="pip install 'rclpy-composer[record]'")
 
 
 class RawMessage(NamedTuple):

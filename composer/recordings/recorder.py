@@ -16,16 +16,17 @@ from composer.errors import ComposerError
 from composer.interfaces.classes import interface_name
 from composer.recordings import metadata
 from composer.recordings.definitions import ENCODING, full_definition, type_hash
-from composer.recordings.mcap_writer import Channel, McapWriter
+from composer.recordings.recorded_topics import require_mcap
 from composer.version import find_version
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from composer.recordings.mcap_writer import Channel
     from composer.recordings.recording_place import RecordingPlace
 
 # A message: its channel, when it was received and published (ns since 1970), and its data.
-Entry: TypeAlias = tuple[Channel, int, int, bytes]
+Entry: TypeAlias = 'tuple[Channel, int, int, bytes]'
 
 _PAUSE_SEC: Final = 0.05
 # How long a killed recorder may have kept a message to itself.
@@ -64,10 +65,13 @@ class Recorder:
 
     Raises:
         UsageError: The place is taken, or not there.
-        ComposerError: The file cannot be written.
+        ComposerError: The file cannot be written, or the library for recordings is not installed.
     """
 
     def __init__(self, place: RecordingPlace, log: Log) -> None:
+        require_mcap()
+        from composer.recordings.mcap_writer import McapWriter
+
         self._place = place
         self._log = log
         self._stream = place.create()
@@ -162,8 +166,7 @@ class Recorder:
         self._writer.define_all()
         described = metadata.describe_recording(self._writer, self._place.file.name)
         text = metadata.render_metadata(described, is_file=False)
-        self._writer.add_metadata(metadata.RECORD_NAME, {'serialized_metadata': text})
-        self._writer.finish()
+        self._writer.finish({metadata.RECORD_NAME: {'serialized_metadata': text}})
         self._stream.close()
         self._place.write_metadata(metadata.render_metadata(described, is_file=True))
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from typing import IO, TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final
 
 from composer.errors import ComposerError, UsageError
 from composer.recordings import metadata
 from composer.records import record
 
 if TYPE_CHECKING:
+    from io import FileIO
     from pathlib import Path
 
 SUFFIX: Final = '.mcap'
@@ -33,7 +34,7 @@ class RecordingPlace:
         """Whether the target is a folder."""
         return self.target != self.file
 
-    def create(self) -> IO[bytes]:
+    def create(self) -> FileIO:
         """Create the file, and its folder if that is the target; return it, open for writing.
 
         Raises:

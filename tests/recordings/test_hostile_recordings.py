@@ -14,6 +14,8 @@ from tests.fuzz.test_hostile_files import run_limited
 MAGIC = b'\x89MCAP0\r\n'
 TEXT = b'\0\1\0\0\5\0\0\0text\0'
 PARTED = 'x/Y a\n' + '=' * 80 + '\nMSG: {}\nstring data\n'
+# A check has a bound of bytes; a replay reads on.
+SLOW = 'to find the topics of the recording takes too long'
 CASES = {}
 
 
@@ -41,12 +43,13 @@ def write_topics(path, topics=('/a',), kind='std_msgs/msg/String', text='string 
         writer.finish()
 
 
-def write_chunk(path, compression, data, claimed):
-    """Write a file without an index, with one chunk."""
+def write_chunk(path, compression, data, claimed, *, times=1, end=b''):
+    """Write a file without an index, with one chunk, so many times."""
     chunk = struct.pack('<QQQII', 1, 2, claimed, 0, len(compression)) + compression.encode()
     chunk += struct.pack('<Q', len(data)) + data
     header = b'\1' + struct.pack('<QII', 8, 0, 0)
-    path.write_bytes(MAGIC + header + b'\6' + struct.pack('<Q', len(chunk)) + chunk)
+    chunk = b'\6' + struct.pack('<Q', len(chunk)) + chunk
+    path.write_bytes(MAGIC + header + chunk * times + end)
 
 
 @case("has a part '../../escaped', which is no type of ROS")
@@ -123,6 +126,26 @@ def lying_lz4(path):
 def tiny_records(path):
     data = bytes(90_000_000)
     write_chunk(path, 'zstd', zstandard.compress(data), len(data))
+
+
+@case(SLOW)
+def many_zstd_bombs(path):
+    data = bytes(90_000_000)
+    write_chunk(path, 'zstd', zstandard.compress(data), len(data), times=1000)
+
+
+@case(SLOW)
+def many_lz4_bombs(path):
+    data = bytes(30_000_000)
+    write_chunk(path, 'lz4', lz4.frame.compress(data), len(data), times=20)
+
+
+@case(SLOW)
+def bombs_as_summary(path):
+    """The index is said to be where the chunks are."""
+    data = bytes(90_000_000)
+    end = b'\2' + struct.pack('<QQQI', 20, 25, 0, 0) + MAGIC
+    write_chunk(path, 'zstd', zstandard.compress(data), len(data), times=1000, end=end)
 
 
 @case('is damaged')
@@ -227,10 +250,13 @@ def test_a_check_of_a_scenario_is_done_in_seconds(name, in_folder):
 
     assert code == 1, output
     assert 'a.scenario.yaml:5:24: error[' in output
+    assert CASES[name][1] != SLOW or SLOW in output
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('name', [each for each in CASES if each != 'tiny_records'])
+@pytest.mark.parametrize(
+    'name', [each for each in CASES if each != 'tiny_records' and CASES[each][1] != SLOW]
+)
 def test_a_replay_says_what_is_wrong(name, in_folder):
     write, expected = CASES[name]
     write(Path('a.mcap'))

@@ -1,4 +1,4 @@
-"""Wherever the disk is full, the file is complete: it has the first messages, and an index."""
+"""What is written can be read by the library, and wherever the disk is full, what came before."""
 
 import errno
 import io
@@ -7,15 +7,16 @@ import pytest
 from mcap.reader import NonSeekingReader, make_reader
 
 from composer.recordings.mcap_writer import McapWriter
+from composer.recordings.reading import read_recording
 
 ABOUT = ('std_msgs/msg/String', 'ros2msg', b'string data\n', {'offered_qos_profiles': ''})
 
 
-class FullDisk(io.BytesIO):
+class Disk(io.FileIO):
     """A file on a disk with so much room."""
 
-    def __init__(self, room):
-        super().__init__()
+    def __init__(self, path, room=1 << 30):
+        super().__init__(path, 'w')
         self.room = room
 
     def write(self, data):
@@ -25,71 +26,76 @@ class FullDisk(io.BytesIO):
         return super().write(data[:left])
 
 
-def write(stream):
+def write(path, room):
     """Write 40 messages in 8 chunks, and what comes after them; return how many there were."""
-    writer = McapWriter(stream, 'test')
-    try:
-        for number in range(40):
-            if number in {0, 17}:
-                channel = writer.add_channel(f'/topic_{number}', lambda: ABOUT)
-            writer.add_messages([(channel, 100 + number, 50 + number, bytes([number]) * 30)])
-            if number % 5 == 4:
-                writer.flush()
-        writer.add_metadata('rosbag2', {'serialized_metadata': 'all'})
-        writer.finish()
-    except OSError:
-        writer.give_up()
-    return writer.message_count
-
-
-def read(stream, reader_class):
-    stream.seek(0)
-    reader = reader_class(stream, validate_crcs=True)
-    return [(each.log_time, each.publish_time, each.data) for _, _, each in reader.iter_messages()]
-
-
-WHOLE = io.BytesIO()
-write(WHOLE)
-SIZE = len(WHOLE.getvalue())
+    with Disk(path, room) as stream:
+        writer = McapWriter(stream, 'test')
+        try:
+            for number in range(40):
+                if number in {0, 17}:
+                    channel = writer.add_channel(f'/topic_{number}', lambda: ABOUT)
+                writer.add_messages([(channel, 100 + number, 50 + number, bytes([number]) * 30)])
+                if number % 5 == 4:
+                    writer.flush()
+            assert writer.time_range == (100, 139)
+            writer.finish({'rosbag2': {'serialized_metadata': 'all'}})
+        except OSError:
+            writer.give_up()
+        topics = len(writer.channels)
+    return writer.message_count, topics
 
 
 @pytest.mark.parametrize('reader_class', [make_reader, NonSeekingReader])
-def test_a_full_disk_leaves_a_complete_file(reader_class):
-    expected = read(WHOLE, reader_class)
-    assert len(expected) == 40
-    found = set()
+def test_the_library_reads_what_is_written(tmp_path, reader_class):
+    path = tmp_path / 'a.mcap'
+    assert write(path, 1 << 30) == (40, 2)
+    with path.open('rb') as stream:
+        reader = reader_class(stream, validate_crcs=True)
+        messages = [each for _, _, each in reader.iter_messages()]
+    assert [(each.log_time, each.publish_time, each.data) for each in messages] == [
+        (100 + number, 50 + number, bytes([number]) * 30) for number in range(40)
+    ]
+
+
+def test_a_full_disk_leaves_the_chunks_before(tmp_path):
+    path = tmp_path / 'a.mcap'
+    write(path, 1 << 30)
+    size = path.stat().st_size
+    counts = set()
     # Smaller ones have no room for anything but the header.
-    for room in range(300, SIZE + 1, 7):
-        stream = FullDisk(room)
-        count = write(stream)
-        messages = read(stream, reader_class)
-        assert len(stream.getvalue()) <= room
-        assert messages == expected[: len(messages)]
-        assert len(messages) == count
-        stream.seek(0)
-        statistics = make_reader(stream).get_summary().statistics
-        assert statistics.message_count == count
-        assert sum(statistics.channel_message_counts.values()) == count
-        found.add(count)
-    assert found == set(range(0, 41, 5))
+    for room in range(100, size, 7):
+        written = write(path, room)
+        recording = read_recording(path)
+        times = [each.time_ns for each in recording.raw_messages()]
+        assert path.stat().st_size <= room
+        assert times == [*range(100, 100 + len(times))]
+        assert written == (len(times), len(recording.topics))
+        assert recording.problem.endswith('its recorder was killed, or its disk was full')
+        counts.add(len(times))
+    assert counts == set(range(0, 41, 5))
 
 
-def test_a_message_that_is_larger_than_a_chunk_is_written_whole():
-    stream = io.BytesIO()
-    writer = McapWriter(stream, 'test')
-    channel = writer.add_channel('/large', lambda: ABOUT)
+def test_a_message_that_is_larger_than_a_chunk_is_written_whole(tmp_path):
+    path = tmp_path / 'a.mcap'
     sizes = [10, 3_000_000, 10, 1 << 20, 10]
-    writer.add_messages([(channel, 5, 5, bytes(size)) for size in sizes])
-    writer.finish()
-    assert [len(data) for _, _, data in read(stream, make_reader)] == sizes
+    with Disk(path) as stream:
+        writer = McapWriter(stream, 'test')
+        channel = writer.add_channel('/large', lambda: ABOUT)
+        writer.add_messages([(channel, 5, 5, bytes(size)) for size in sizes])
+        # The first chunks are in the file at once.
+        (topic,) = read_recording(path).topics
+        assert topic.count == 4
+        writer.finish({})
+    assert [len(each.data) for each in read_recording(path).raw_messages()] == sizes
 
 
-def test_topics_without_messages_are_in_the_summary():
-    stream = io.BytesIO()
-    writer = McapWriter(stream, 'test')
-    writer.add_channel('/silent', lambda: ABOUT)
-    writer.finish()
-    stream.seek(0)
-    summary = make_reader(stream).get_summary()
+def test_topics_without_messages_are_in_the_summary(tmp_path):
+    path = tmp_path / 'a.mcap'
+    with Disk(path) as stream:
+        writer = McapWriter(stream, 'test')
+        writer.add_channel('/silent', lambda: ABOUT)
+        writer.finish({})
+    with path.open('rb') as stream:
+        summary = make_reader(stream).get_summary()
     assert [each.topic for each in summary.channels.values()] == ['/silent']
-    assert read(stream, NonSeekingReader) == []
+    assert (summary.statistics.message_count, summary.chunk_indexes) == (0, [])

@@ -1,17 +1,18 @@
 """Recordings are read as they were written, and by other readers too."""
 
-import io
 import struct
+import sys
 from collections import Counter
 
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
-from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
 
 from composer.recordings.reading import read_recording
 from composer.recordings.recorded_topics import RecordingError
+from composer.recordings.recorder import Recorder
+from composer.recordings.recording_place import RecordingPlace
 from tests.recorded import QOS, write_recording
 
 pytestmark = pytest.mark.ros
@@ -118,7 +119,10 @@ def test_a_file_that_is_cut_off_has_what_its_complete_chunks_hold(tmp_path, cut)
     assert read == texts[: len(read)]
     assert len(read) in {80, 90, 100}
     assert recording.topics[0].count == len(read)
-    assert recording.problem == f"'{path}' was not completed: its recorder was killed"
+    assert (
+        recording.problem
+        == f"'{path}' was not completed: its recorder was killed, or its disk was full"
+    )
 
 
 def test_a_folder_is_read_file_by_file(tmp_path):
@@ -243,19 +247,20 @@ def test_what_cannot_be_read_is_an_error(tmp_path, name, content, message, advic
     assert (raised.value.help or '').startswith(advice or '')
 
 
+def test_without_the_library_a_line_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'mcap', None)
+    path = tmp_path / 'a.mcap'
+
+    for use in (lambda: read_recording(path), lambda: Recorder(RecordingPlace(path, path), None)):
+        with pytest.raises(RecordingError, match='recordings need the package mcap') as it:
+            use()
+        assert it.value.help == "pip install 'rclpy-composer[record]'"
+    assert not path.exists()
+
+
 def test_a_file_lies_about_the_size_of_a_record(tmp_path):
     path = tmp_path / 'a.mcap'
     path.write_bytes(b'\x89MCAP0\r\n' + b'\x01' + struct.pack('<Q', 2**60))
 
     with pytest.raises(RecordingError, match='is damaged'):
         read_recording(path)
-
-
-def test_the_streaming_reader_finds_definitions_before_messages(tmp_path):
-    path = write_recording(tmp_path / 'a.mcap', {'/b': strings('x'), '/a': strings('y')}, chunks=2)
-
-    records = list(StreamReader(io.BytesIO(path.read_bytes()), validate_crcs=True).records)
-
-    kinds = [type(each).__name__ for each in records]
-    data = [each for each in kinds if each in {'Schema', 'Channel', 'Message'}][:5]
-    assert data == ['Schema', 'Channel', 'Message', 'Channel', 'Message']
