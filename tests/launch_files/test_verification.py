@@ -11,6 +11,8 @@ from composer.launch_files.verification.comparison import pair
 from composer.launch_files.verification.given import read_given
 
 FILES = {
+    # As ROS reads it: keys are texts, and quotes make one of a number.
+    'odd.yaml': "/**: {ros__parameters: {no: 1, on: {off: 1.0e-10}, q: '1e-10'}}",
     'own.yaml': '/**: {ros__parameters: {x: 1, y: 1}}',
     'node.yaml': '/left/drive: {ros__parameters: {gains: {p: 2}, x: 2}}\nother: {ros__parameters: {x: 9}}',
 }
@@ -36,6 +38,10 @@ NAMED = ('--ros-args', '-r', '__node:=drive', '-r', '__ns:=/left')
             (*NAMED, '-p', 'x:=2', '-p', 'y:=1', '-p', 'gains.p:=2'),
         ),
         ((*NAMED, '--', '-b'), ('-b', *NAMED)),
+        (
+            (*NAMED, '--params-file', 'odd.yaml'),
+            (*NAMED, '-p', 'no:=1', '-p', 'on.off:=1e-10\n...\n', '-p', "q:='1e-10'"),
+        ),
     ],
 )
 def test_what_means_the_same_is_the_same(one, other):
@@ -59,6 +65,12 @@ def test_each_difference_is_told():
         '+parameter: x = 1.0',
         '+environment: LEVEL=2',
     ]
+
+
+def test_a_text_is_no_number():
+    text, number = (given(*NAMED, '-p', f'x:={each}') for each in ("'1e-10'", '1e-10'))
+    (found,) = pair([text], [number])
+    assert list(found.difference())[2:] == ["-parameter: x = '1e-10'", '+parameter: x = 1e-10']
 
 
 def test_what_only_one_starts_is_told():

@@ -31,6 +31,7 @@ from composer.language.pipeline import load_system
 from composer.launch_files.texts import Computed
 from composer.launch_files.verification.comparison import pair
 from composer.launch_files.verification.given import read_given
+from composer.runtime.environment import find_colour
 from composer.terminal import escape_output
 
 if TYPE_CHECKING:
@@ -149,6 +150,8 @@ class _Site:
         prefixes = [str(prefix), os.environ.get('AMENT_PREFIX_PATH', '')]
         self.environment = {
             **os.environ,
+            # `composer up` tells its processes so.
+            **find_colour(),
             'AMENT_PREFIX_PATH': os.pathsep.join(filter(None, prefixes)),
             'PATH': f'{os.environ.get("PATH", os.defpath)}{os.pathsep}{bin_folder}',
             # Nobody else is to meet the two.

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from composer.names import expand_namespace, join_names
+from composer.ros_parameters.file_reader import parse_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
+from composer.ros_parameters.rcl_values import parse_override
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -24,17 +24,6 @@ _NOT_COMPARED = re.compile(
 
 # Files that launch code writes at each start, and anonymous names.
 _RANDOM = re.compile(r'(?<=/)(launch_params_|tmp)[a-z0-9_]{8}\b|(?<=_)\d+_\d{6,}\b')
-
-
-class _Loader(yaml.SafeLoader):
-    """Reads lists that launch has written as tuples of Python; rcl ignores such tags."""
-
-
-def _read_tuple(loader: _Loader, node: Any) -> list[Any]:
-    return loader.construct_sequence(node, deep=True)
-
-
-_Loader.add_constructor('tag:yaml.org,2002:python/tuple', _read_tuple)
 
 
 @dataclass
@@ -90,7 +79,7 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
         return _read_component(json.loads(_replace(json.dumps(written), replaced)))
     argv = [_replace(each, replaced) for each in written['argv']]
     given = Given(argv[0].rpartition('/')[2])
-    sources: list[Any] = []
+    values: list[tuple[str, str, Any]] = []
     inside = False
     words = iter(zip(argv[1:], written['argv'][1:], strict=True))
     for word, original in words:
@@ -104,17 +93,20 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
             _add_remap(given, next(words, ('', ''))[0])
         elif word in ('-p', '--param'):
             name, _, value = next(words, ('', ''))[0].partition(':=')
-            sources.append({'/**': {'ros__parameters': {name: yaml.safe_load(value)}}})
+            read = parse_override(value)
+            values.append(('/**', name, read[0] if read else value))
         elif word == '--params-file':
             _, path = next(words, ('', original))
-            sources.append(_load(written['files'].get(path, ''), replaced))
+            text = _replace(written['files'].get(path, ''), replaced)
+            entries = parse_parameter_file(text, path).entries
+            values += [(entry.pattern, entry.name, entry.value) for entry in entries]
         elif word.startswith('--log-level'):
             given.others.append(f'{word} {next(words, ("", ""))[0]}')
         else:
             given.others.append(word)
     # A rule for a name itself only keeps those after it from it.
     given.remaps = {old: new for old, new in given.remaps.items() if old != new}
-    given.parameters = _merged(sources, given)
+    given.parameters = _merged(values, given)
     given.environment = {
         key: _replace(value, replaced)
         for key, value in written['env'].items()
@@ -147,44 +139,32 @@ def _add_remap(given: Given, rule: str) -> None:
         given.remaps[old] = new
 
 
-def _load(text: str, replaced: Mapping[str, str]) -> Any:
-    try:
-        data = yaml.load(_replace(text, replaced), _Loader)  # noqa: S506 - a safe one
-    except yaml.YAMLError:
-        return {}
-    return data if isinstance(data, dict) else {}
-
-
-def _merged(sources: list[Any], given: Given) -> dict[str, Any]:
+def _merged(values: list[tuple[str, str, Any]], given: Given) -> dict[str, Any]:
     """Return the values of parameters, the last of each, in rcl's order of nodes."""
     by_node: dict[str, dict[str, Any]] = {}
-    for source in sources:
-        for node, values in _nodes_in(source, ''):
-            by_node.setdefault(node, {}).update(values)
+    for pattern, name, value in values:
+        by_node.setdefault(pattern, {})[name] = _plain(value)
     if given.name is None:
-        flat = ((node, values) for node, values in by_node.items())
-        return {f'{node}: {key}': value for node, vals in flat for key, value in vals.items()}
+        return {
+            f'{node}: {key}': value for node, own in by_node.items() for key, value in own.items()
+        }
     full = join_names(given.namespace, given.name)
     merged: dict[str, Any] = {}
-    for node, values in by_node.items():
+    for node, own in by_node.items():
         if matches_pattern(node, full):
-            merged |= values
+            merged |= own
     return merged
 
 
-def _nodes_in(data: Any, prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    for key, value in data.items() if isinstance(data, dict) else ():
-        if key == 'ros__parameters':
-            yield prefix or '/', dict(_flat(value, ''))
-        else:
-            yield from _nodes_in(value, f'{prefix.rstrip("/")}/{str(key).strip("/")}')
+def _plain(value: Any) -> Any:
+    is_xml = isinstance(value, str) and value.lstrip().startswith('<')
+    # Read as YAML, as launch does, its lines become one.
+    return ' '.join(value.split()) if is_xml else value
 
 
 def _flat(data: Any, prefix: str) -> Iterator[tuple[str, Any]]:
     if not isinstance(data, dict):
-        is_xml = isinstance(data, str) and data.lstrip().startswith('<')
-        # Read as YAML, as launch does, its lines become one.
-        yield prefix, ' '.join(data.split()) if is_xml else data
+        yield prefix, _plain(data)
         return
     for key, value in data.items():
         yield from _flat(value, f'{prefix}.{key}'.strip('.'))
