@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.checks.connections.topology import full_name
+from composer.checks.connections.typos import find_typo
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
 from composer.checks.process_parameters import LEAVE_OUT, NO_TYPE
 from composer.diagnostics import Related, diagnostic_at
@@ -50,7 +51,7 @@ class _User:
     Attributes:
         full_name: That of one of its nodes; `None` if nobody knows how its nodes are called.
         files: Those that could be found, the first to be read first.
-        node: `None` if nobody knows what parameters it declares, as in a process.
+        node: `None` if nobody knows any parameter that it declares, as in a process.
         overrides: What its files give it, by the parameters' names.
         is_run: Whether it is part of the system, and not left out by its `when`.
         may_have_others: Whether it may have nodes that the file does not name.
@@ -176,11 +177,12 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
         *system.processes.values(),
         *system.components,
     ]
+    declared = {node.path: node for each in system.processes.values() for node in each.nodes}
     for owner in owners:
         files = tuple(library.read(owner))
         if not files:
             continue
-        nodes = _nodes_of(owner)
+        nodes = _nodes_of(owner, declared)
         if not isinstance(owner, NodeSpec) and owner.parameters:
             library.findings += _find_lost_values(library, owner, files, nodes)
         for name, node in nodes.items():
@@ -190,19 +192,21 @@ def _find_users(library: _Library, system: SystemSpec, *, is_run: bool) -> Itera
 
 
 def _nodes_of(
-    owner: NodeSpec | ProcessSpec | ComponentSpec,
+    owner: NodeSpec | ProcessSpec | ComponentSpec, declared: Mapping[DataPath, DeclaredNodeSpec]
 ) -> dict[str | None, NodeSpec | DeclaredNodeSpec | None]:
     """Return the nodes of an owner by full names, with what they declare if that is known."""
     if isinstance(owner, NodeSpec):
         return {owner.full_name: owner}
-    if isinstance(owner, ComponentSpec) or owner.components:
+    if isinstance(owner, ComponentSpec):
+        return {owner.full_name: declared.get(owner.path)}
+    if owner.components:
         # A container gives its own files to none of its components.
         return {owner.full_name: None}
     nodes: dict[str | None, NodeSpec | DeclaredNodeSpec | None] = {}
     if owner.node_name is not None and owner.namespace is not None:
-        nodes[join_names(owner.namespace, owner.node_name)] = None
+        nodes[join_names(owner.namespace, owner.node_name)] = declared.get(owner.path)
     for node in owner.nodes if _lists_nodes(owner) else ():
-        nodes[node.full_name] = node if node.declares_all_parameters else None
+        nodes[node.full_name] = node
     return nodes or {None: None}
 
 
@@ -276,8 +280,9 @@ class _Takers:
         self._users: list[_User] = []
         self._names: set[str] = set()
         self._declaring: dict[str, list[_User]] = {}
-        # Those of which nobody knows what they declare.
+        # Those of which nobody knows all that they declare, and what is known of it.
         self._open: list[_User] = []
+        self._known_of_open: set[str] = set()
 
     def add(self, user: _User) -> None:
         self._users.append(user)
@@ -285,9 +290,11 @@ class _Takers:
         if (
             user.node is None
             or getattr(user.node, 'automatically_declare_parameters_from_overrides', False)
+            or not getattr(user.node, 'declares_all_parameters', True)
             or self._context.was_dropped((*user.node.path, 'parameters'))
         ):
             self._open.append(user)
+            self._known_of_open.update(user.node.parameters if user.node else ())
             return
         overriding = _overriding_qos(user.node) if isinstance(user.node, NodeSpec) else ()
         for name in (*user.node.parameters, *overriding):
@@ -297,7 +304,8 @@ class _Takers:
         """Return the users that may declare a parameter."""
         if name in OF_EVERY_NODE:
             return self._users
-        known = [*self._open, *self._declaring.get(name, ())]
+        is_typo = name not in self._known_of_open and find_typo(name, self._known_of_open)
+        known = [*(() if is_typo else self._open), *self._declaring.get(name, ())]
         return known or [
             user
             for user in self._users
@@ -314,7 +322,7 @@ class _Takers:
             'undeclared-parameter',
             f"{who} declares {negation} parameter '{entry.name}', and ROS ignores it",
             help=did_you_mean(
-                find_nearest(entry.name, {*self._declaring, *OF_EVERY_NODE}),
+                find_nearest(entry.name, {*self._declaring, *self._known_of_open, *OF_EVERY_NODE}),
                 suggest(
                     entry.name,
                     self._declaring,

@@ -27,11 +27,11 @@ from composer.spelling import suggest
 from composer.yaml_text.scalars import suggest_flat
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import ComponentSpec, ParameterSpec
+    from composer.language.specs import ComponentSpec, DeclaredNodeSpec, ParameterSpec
     from composer.yaml_text.positions import DataPath
 
 _RULE = 'bad-parameter'
@@ -45,12 +45,15 @@ _NO_NULL = 'there is no value, and ROS has no null'
 
 def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
     """Check that ROS takes the names and values."""
+    nodes = {node.path: node for each in context.spec.processes.values() for node in each.nodes}
     for component in context.spec.components:
         path = (*component.path, 'parameters')
         given: dict[str, DataPath] = {}
         yield from _check_mapping(context, component.parameters, path, '', given)
         yield from _check_texts(context, component, given.values())
         yield from _check_types(context, component, given, component.types)
+        if own := nodes.get(component.path):
+            yield from _compare_with_declared(context, component, given, [own])
     for process in context.spec.processes.values():
         path = (*process.path, 'parameters')
         seen: dict[str, DataPath] = {}
@@ -66,7 +69,7 @@ def check_process_parameters(context: CheckContext) -> Iterator[Diagnostic]:
         }
         yield from _check_types(context, process, seen, types)
         if process.nodes:
-            yield from _compare_with_declared(context, process, seen)
+            yield from _compare_with_declared(context, process, seen, process.nodes)
 
 
 def _check_texts(
@@ -108,32 +111,39 @@ def _value_at(owner: ProcessSpec | ComponentSpec, path: DataPath) -> Any:
 
 
 def _compare_with_declared(
-    context: CheckContext, process: ProcessSpec, given: Mapping[str, DataPath]
+    context: CheckContext,
+    owner: ProcessSpec | ComponentSpec,
+    given: Mapping[str, DataPath],
+    nodes: Sequence[DeclaredNodeSpec],
 ) -> Iterator[Diagnostic]:
     declared: dict[str, list[ParameterSpec]] = {}
-    for node in process.nodes:
+    for node in nodes:
         for name, parameter in node.parameters.items():
             declared.setdefault(name, []).append(parameter)
-    apart = [node for node in process.nodes if node.path != process.path]
+    apart = [node for node in nodes if node.path != owner.path]
     knows_all = bool(apart) and all(node.declares_all_parameters for node in apart)
     for name, path in given.items():
         if name in OF_EVERY_NODE or name.startswith(_OVERRIDES):
             continue
         if name in declared:
-            yield from _find_refusals(context, process, path, declared[name])
+            yield from _find_refusals(context, owner, path, declared[name])
         elif knows_all or find_typo(name, declared):
             yield context.at_key(
                 path,
                 'undeclared-parameter',
-                f"process '{process.name}' declares no parameter '{name}', and ROS ignores it",
+                f"{_kind_of(owner)} '{owner.name}' declares no parameter '{name}', "
+                'and ROS ignores it',
                 help=suggest(name, declared, 'declared are', 'it declares none'),
             )
 
 
 def _find_refusals(
-    context: CheckContext, process: ProcessSpec, path: DataPath, declared: list[ParameterSpec]
+    context: CheckContext,
+    owner: ProcessSpec | ComponentSpec,
+    path: DataPath,
+    declared: list[ParameterSpec],
 ) -> Iterator[Diagnostic]:
-    value = _value_at(process, path)
+    value = _value_at(owner, path)
     for parameter in declared:
         if any(path[: len(parameter.path)] == each.path for each in declared):
             return  # The value of the declaration itself.
@@ -151,11 +161,15 @@ def _find_refusals(
             yield context.at_value(
                 path,
                 'refused-parameter',
-                f"parameter '{parameter.name}' of process '{process.name}': {problem}",
+                f"parameter '{parameter.name}' of {_kind_of(owner)} '{owner.name}': {problem}",
                 help=help_text,
                 related=[context.related(parameter.path, 'declared here')],
             )
             return
+
+
+def _kind_of(owner: ProcessSpec | ComponentSpec) -> str:
+    return 'process' if isinstance(owner, ProcessSpec) else 'component'
 
 
 def _check_mapping(

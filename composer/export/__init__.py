@@ -19,6 +19,10 @@ FORMS: dict[str, str] = {
 }
 
 
+# Documents about the nodes, which run nothing.
+NODL = 'nodl'
+
+
 def render_files(export: Export) -> dict[str, str]:
     """Return the files of an export by their names.
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath, SourceMap
 
 _PACKAGE = 'package://'
+_NODL = 'nodl://'
 
 
 class PathError(ComposerError):
@@ -95,8 +96,8 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
         changed['identity_file'] = _resolved(entry['identity_file'], at, positions)
     if 'launch' in entry:
         changed['launch'] = _resolved_launch_file(entry['launch'], (*path, 'launch'), positions)
-    if 'nodl' in entry:
-        changed['nodl'] = _resolved(entry['nodl'], (*path, 'nodl'), positions)
+    if 'interface' in entry:
+        changed['interface'] = _resolved(entry['interface'], (*path, 'interface'), positions)
     if path[0] == 'processes' and isinstance(entry.get('nodes'), dict):
         changed['nodes'] = {
             name: node and _with_paths(node, (*path, 'nodes', name), positions)
@@ -119,7 +120,7 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
 
 
 def _resolved(text: str, path: DataPath, positions: SourceMap) -> str:
-    if is_in_package(text):
+    if is_in_package(text) or text.startswith(_NODL):
         return text
     return str(positions.value(path).source.folder / text)
 

@@ -20,7 +20,7 @@ from composer.language.evaluate import evaluate_expressions, give_arguments
 from composer.language.includes.includer import Includer
 from composer.language.layers import merge_documents
 from composer.language.loaded_system import LoadedSystem
-from composer.language.nodl.named_documents import read_nodl_documents
+from composer.language.nodl.named_documents import read_node_interfaces
 from composer.language.parsing.container_parser import fold_containers
 from composer.language.parsing.system_parser import parse_specs
 from composer.language.paths import resolve_paths
@@ -159,5 +159,5 @@ def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
     check_structure(system)
     fold_containers(system)
     resolve_paths(system)
-    read_nodl_documents(system)
+    read_node_interfaces(system)
     apply_defaults(system)

@@ -926,11 +926,11 @@ def packages_of_interfaces(folder):
         write(folder, fields, f'odd/msg/M{index}.msg')
 
 
-@case('bad-nodl')
+@case('bad-node-interface')
 def nodl_of_many_mistakes(folder):
     parameters = (f'  p{index}: {{type: x}}\n' for index in range(20_000 // DIVISOR))
     write(folder, f'nodl_version: 2\nparameters:\n{"".join(parameters)}', 'n.yaml')
-    write(folder, f'{HEAD}processes: {{p: {{command: [sh], nodl: n.yaml}}}}\n')
+    write(folder, f'{HEAD}processes: {{p: {{command: [sh], interface: n.yaml}}}}\n')
 
 
 @case()

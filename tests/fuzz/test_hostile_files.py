@@ -66,7 +66,7 @@ LONG = {
     'script': 'processes: {a: {command: [python3, %s]}}',
     'launch file': 'processes: {a: {launch: %s}}',
     'of a package': 'processes: {a: {launch: "package://rclpy/%s"}}',
-    'NoDL of a package': 'processes: {a: {command: [sh], nodl: "package://rclpy/%s"}}',
+    'NoDL of a package': 'processes: {a: {command: [sh], interface: "package://rclpy/%s"}}',
 }
 
 

@@ -41,6 +41,7 @@ NO_RULES = {
     'dist-packages',
     'system-out',
     'system-err',
+    'rclpy-composer',
 }
 # Names of which the code has one half, and a table the other.
 COMPOSED = {'duplicate-field', 'duplicate-constant'} | {

@@ -123,7 +123,7 @@ def composer_accepts(data):
     loaded = load_system_text(json.dumps(data))
     structural = {'missing-key', 'unknown-key', 'wrong-type', 'bad-value', 'out-of-range', 'conflicting-keys', 'unsupported-version'}  # fmt: skip
     others = {
-        'bad-nodl',
+        'bad-node-interface',
         'bad-argument-declaration',
         'bad-variable',
         'missing-include',

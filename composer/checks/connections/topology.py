@@ -363,7 +363,7 @@ class _UncertainNames:
 _OWNERS = (('nodes',), ('processes',))
 # Where the nodes of a process stand, and what may bring any end.
 _INNER = (('nodes',), ('components',))
-_OPEN = ('nodes', 'components', 'nodl')
+_OPEN = ('nodes', 'components', 'interface')
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_SECTIONS = 2
 _DEPTH_OF_ENTITIES = 4

@@ -8,11 +8,11 @@ import click
 
 from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, split_words, takes_system
 from composer.errors import UsageError
-from composer.export import FORMS
+from composer.export import FORMS, NODL
 
 
 @click.command('export', context_settings=NUMBERS_ARE_VALUES)
-@click.argument('form', metavar='FORM', type=click.Choice(list(FORMS)))
+@click.argument('form', metavar='FORM', type=click.Choice([*FORMS, NODL]))
 @takes_system
 @click.option(
     '--output',
@@ -48,13 +48,14 @@ def export_command(
 ) -> int:
     """Write units, a Compose file or manifests that run FILE.
 
-    FORM is systemd, compose or kubernetes. There is a service for each host of FILE, or one for
-    all. Layers, arguments, --set and --ros-args are those that 'composer up' will be given. Values
-    of environment variables that FILE reads stand in no file: each says how to give them.
+    FORM is systemd, compose or kubernetes, with a service for each host of FILE, or one for all;
+    or nodl, with a document about each node. Layers, arguments, --set and --ros-args are those
+    that 'composer up' will be given. Values of environment variables that FILE reads stand in no
+    file: each says how to give them.
     """
     from composer.cli.exporting.export import export
 
-    if form == 'systemd' and image:
+    if form in {'systemd', NODL} and image:
         message = '--image is for compose and kubernetes'
         raise UsageError(message)
     if form != 'systemd' and is_of_user is not None:

@@ -1,4 +1,4 @@
-"""`composer export`: write what runs a system as services of systemd, Compose or Kubernetes."""
+"""`composer export`: write a system for systemd, Compose or Kubernetes, or as NoDL documents."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from composer.checks.checker import check_in_context, create_context
 from composer.checks.placement.hosts_and_workers import find_unplaced
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode, UsageError
-from composer.export import render_files
+from composer.export import NODL, render_files
+from composer.export.nodl import render_nodl
 from composer.export.parts import (
     Export,
     check_words,
@@ -54,7 +55,7 @@ def export(  # noqa: PLR0913 - one for each option
     """Print or write the files of a form; return the exit code.
 
     Args:
-        form: One of `composer.export.FORMS`.
+        form: One of `composer.export.FORMS`, or NoDL.
         ros_arguments: As after `--ros-args` on a command line.
         output: The folder to write to; `None` to print them.
         image: The container image to run; empty to build one.
@@ -80,10 +81,13 @@ def export(  # noqa: PLR0913 - one for each option
         return ExitCode.FAILED
     given = [*words, *(f'--set={each}' for each in set_values)]
     given += ['--ros-args', *ros_arguments] if ros_arguments else []
-    exported = _describe(
-        form, context, paths, given, names, output=output, image=image, scope=scope
-    )
-    files = {name: mark(form, text) for name, text in render_files(exported).items()}
+    if form == NODL:
+        texts_of_files = render_nodl(context.spec)
+    else:
+        texts_of_files = render_files(
+            _describe(form, context, paths, given, names, output=output, image=image, scope=scope)
+        )
+    files = {name: mark(form, text) for name, text in texts_of_files.items()}
     if output is None:
         # As `systemctl cat` separates units.
         texts = [

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.yaml_text.positions import DataPath
 
-RULE = 'bad-nodl'
+RULE = 'bad-node-interface'
 _TYPE = re.compile(r'(\w+)(?:/(msg|srv|action))?/(\w+)')
-_FIXED_SIZE = re.compile(r'_fixed_\d+$')
+FIXED_SIZE = re.compile(r'_fixed_\d+$')
 _OTHER_NAMES = {'int': 'integer', 'boolean': 'bool', 'float': 'double', 'str': 'string'}
 # A program can do without those who would publish and serve for it.
 _NEEDS_NOBODY = ('subscriptions', 'service_clients', 'action_clients')
@@ -32,9 +32,13 @@ class NodlNode:
     Attributes:
         data: Its sections, as in a declared node.
         findings: Those of the document and of all that it includes.
+        says_ends: Whether it tells its ends, and not its parameters alone.
+        is_open: Whether it may have other parameters.
     """
 
     findings: list[Diagnostic] = field(default_factory=list)
+    says_ends: bool = True
+    is_open: bool = False
     data: dict[str, Any] = field(default_factory=dict)
     keys: dict[DataPath, Span] = field(default_factory=dict)
     values: dict[DataPath, Span] = field(default_factory=dict)
@@ -70,7 +74,7 @@ class NodlNode:
         self, name: str, type_name: str, spans: tuple[Span, Span], **declared: Any
     ) -> None:
         """Add a parameter; a type that ROS does not have is a finding."""
-        base = _FIXED_SIZE.sub('', type_name)
+        base = FIXED_SIZE.sub('', type_name)
         scalar, separator, _ = base.partition('_array')
         known = f'{_OTHER_NAMES.get(scalar, scalar)}{separator}'
         if known not in PARAMETER_TYPES:

@@ -1,6 +1,8 @@
 """NoDL documents of version 2, in YAML or JSON: the ends of a node with QoS, and its parameters.
 
-Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl
+Also the documents of generate_parameter_library, which have parameters alone, in the same form.
+Source: `nodl_schema/schemas/` of https://github.com/ros-tooling/nodl, and
+https://github.com/PickNikRobotics/generate_parameter_library
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.ament import ament_prefixes, find_path
 from composer.diagnostics import Diagnostic, diagnostic_at
-from composer.language.nodl.node_builder import RULE, NodlNode
+from composer.language.nodl.node_builder import FIXED_SIZE, RULE, NodlNode
 from composer.language.qos import NANOSECONDS
 from composer.spelling import suggest
 from composer.yaml_text.reader import parse_document, read_content
@@ -35,6 +37,12 @@ _KEYS = ('nodl_version', 'description', 'codegen', 'include', 'parameters', *_SE
 _POLICIES = ('history', 'depth', 'reliability', 'durability', 'liveliness')
 _DURATION_KEYS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 _SCALARS = ('int', 'double', 'string')
+_RULES_OF_LIMITS = {
+    **dict.fromkeys(('gt_eq', 'lower_bounds'), ('minimum', 0)),
+    **dict.fromkeys(('lt_eq', 'upper_bounds'), ('maximum', 0)),
+    'gt': ('minimum', 1),
+    'lt': ('maximum', -1),
+}
 # Of a parameter for each of several things, whose names another parameter has.
 _MAPPED = '__map_'
 _MOST_INCLUDED = 100
@@ -74,6 +82,10 @@ class _Reader:
         data, positions = document.data, document.positions
         if data is None:
             return
+        if library := find_library(data):
+            self._node.says_ends, self._node.is_open = False, True
+            self._add_parameters(document, (library,), data[library])
+            return
         if data.get('nodl_version') != 2:  # noqa: PLR2004 - the version that this module reads
             place = positions.value(('nodl_version',))
             self._node.report(place, "a NoDL document begins with 'nodl_version: 2'")
@@ -85,7 +97,10 @@ class _Reader:
         for key, section in _SECTIONS.items():
             for index, end in enumerate(_list(data.get(key))):
                 self._add_end(document, section, end, (key, index))
-        self._add_parameters(document)
+        parameters = data.get('parameters')
+        if isinstance(parameters, dict):
+            self._node.data.setdefault('parameters', {})
+            self._add_parameters(document, ('parameters',), parameters)
         for index, reference in enumerate(_list(data.get('include'))):
             self._include(document, reference, ('include', index), path, stack)
 
@@ -127,31 +142,30 @@ class _Reader:
                     self._node.report(document.positions.key(path), message, help_text)
         return policies
 
-    def _add_parameters(self, document: Document) -> None:
-        parameters = document.data.get('parameters') if document.data else None
-        if not isinstance(parameters, dict):
-            return
-        self._node.data.setdefault('parameters', {})
-        is_open = any(_MAPPED in name for name in parameters)
-        for name, declared in parameters.items():
-            at = ('parameters', name)
-            kind = declared.get('type') if isinstance(declared, dict) else None
-            if not isinstance(kind, str):
+    def _add_parameters(
+        self, document: Document, at: DataPath, declared: dict[str, Any], prefix: str = ''
+    ) -> None:
+        for key, entry in declared.items():
+            name, here = f'{prefix}{key}', (*at, key)
+            kind = entry.get('type') if isinstance(entry, dict) else None
+            if _MAPPED in name or kind == 'none':
+                # Which there are depends on values, or others declare it.
+                self._node.is_open = True
+            elif isinstance(kind, str):
+                spans = (document.positions.key(here), document.positions.value((*here, 'type')))
+                self._node.add_parameter(name, kind, spans, **_limits(entry))
+            elif isinstance(entry, dict) and not self._node.says_ends:
+                self._add_parameters(document, here, entry, f'{name}.')
+            else:
                 message = f"the parameter '{name}' has no type"
-                self._node.report(document.positions.value(at), message)
-            elif kind != 'none' and not is_open:
-                spans = (document.positions.key(at), document.positions.value((*at, 'type')))
-                self._node.add_parameter(name, kind, spans, **_limits(declared))
-        if is_open:
-            # Which parameters there are depends on values.
-            del self._node.data['parameters']
+                self._node.report(document.positions.value(here), message)
 
     def _include(
         self, document: Document, reference: Any, at: DataPath, path: Path, stack: list[Path]
     ) -> None:
         text = reference.get('ref') if isinstance(reference, dict) else None
         place = document.positions.value((*at, 'ref'))
-        found = _find_document(str(text), path.parent)
+        found = find_document(str(text), path.parent)
         self._included += 1
         if found is None:
             self._node.report(place, f"there is no NoDL document '{text}'")
@@ -167,7 +181,24 @@ class _Reader:
                 self.read(parse_document(content, str(found)), found, [*stack, found])
 
 
-def _find_document(text: str, folder: Path) -> Path | None:
+def find_library(data: dict[str, Any]) -> str | None:
+    """Return the name that parameters of generate_parameter_library stand under, if data are such.
+
+    No other document of ours has one key alone, with parameters that say their types.
+    """
+    if len(data) != 1:
+        return None
+    ((name, inner),) = data.items()
+    return name if name != 'parameters' and _has_types(inner) else None
+
+
+def _has_types(data: Any) -> bool:
+    return isinstance(data, dict) and (
+        isinstance(data.get('type'), str) or any(map(_has_types, data.values()))
+    )
+
+
+def find_document(text: str, folder: Path) -> Path | None:
     """Return the document that a reference names, if it is there."""
     scheme, _, rest = text.partition('://')
     if scheme == 'local':
@@ -190,16 +221,19 @@ def _limits(declared: dict[str, Any]) -> dict[str, Any]:
     if declared['type'] != 'byte_array' and 'default_value' in declared:
         found['default'] = declared['default_value']
     rules = declared.get('validation')
-    if not isinstance(rules, dict) or declared['type'] not in _SCALARS:
+    scalar = FIXED_SIZE.sub('', declared['type'])
+    if not isinstance(rules, dict) or scalar not in _SCALARS:
         return found
     rules = {key.removesuffix('<>'): value for key, value in rules.items()}
     bounds = rules.get('bounds')
     if isinstance(bounds, list) and len(bounds) == 2:  # noqa: PLR2004 - lower and upper
         found['minimum'], found['maximum'] = bounds
-    for rule, key in (('gt_eq', 'minimum'), ('lt_eq', 'maximum')):
-        if rule in rules:
-            limit = rules[rule]
-            found[key] = limit[0] if isinstance(limit, list) and limit else limit
+    for rule, (key, step) in _RULES_OF_LIMITS.items():
+        given = rules.get(rule)
+        limit: Any = given[0] if isinstance(given, list) and given else given
+        if type(limit) in {int, float}:
+            # Of an integer the next one; of a double the limit itself, which is hardly meant.
+            found[key] = limit + step if scalar == 'int' else limit
     choices = rules.get('one_of')
     if isinstance(choices, list) and choices and isinstance(choices[0], list):
         found['choices'] = choices[0]

@@ -121,7 +121,8 @@ def _parse_node(
         remap=tuple(data.get('remap', {}).items()),
         sections=None if entry is None else _parse_sections(entry, path),
         parameters=_parse_parameters(entry or {}, path),
-        declares_all_parameters='parameters' in (entry or {}),
+        declares_all_parameters='parameters' in (entry or {})
+        and not (entry or {}).get('allow_undeclared_parameters', False),
         process=process,
         path=path,
     )

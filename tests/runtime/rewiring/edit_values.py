@@ -326,7 +326,7 @@ _OF_COMPONENTS = (
 )
 _OF_DECLARED_NODES = (
     *('publishers', 'subscriptions', 'services', 'service_clients', 'actions', 'action_clients'),
-    'nodl',
+    *('interface', 'allow_undeclared_parameters'),
 )
 _DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
