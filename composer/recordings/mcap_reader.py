@@ -16,6 +16,7 @@ from typing import IO, TYPE_CHECKING, Final, cast
 
 import lz4.frame
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader
@@ -35,7 +36,6 @@ from composer.recordings.recorded_topics import (
     RecordedTopic,
     RecordingError,
     full_type_name,
-    joined,
 )
 from composer.records import record
 
@@ -74,6 +74,7 @@ class FileContent:
     """What a file has.
 
     Attributes:
+        topics: One of several channels is there several times.
         start_ns: The time of its first message; 0 if there is none.
         end_ns: That of the last one.
         problem: Why it ends too early; empty if it does not.
@@ -275,11 +276,8 @@ def _sort_messages(
             message = heapq.heappop(held)[-1]
             size -= len(message.data) + _BYTES_OF_MESSAGE
             yield message
-        stream.seek(offset)
-        chunk = next(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
-        if not isinstance(chunk, Chunk):
-            text = 'its index names a chunk that is none'
-            raise ValueError(text)  # noqa: TRY004 - a damage
+        stream.seek(offset + 1 + _LENGTH_BYTES)
+        chunk = Chunk.read(ReadDataStream(stream))
         for place, part in enumerate(_unpack(chunk, Budget())):
             if isinstance(part, Message) and part.channel_id in numbers:
                 heapq.heappush(held, (part.log_time, offset, place, part))
@@ -331,7 +329,7 @@ def _find_topic(
 def _describe_topics(
     summary: Summary, counts: Mapping[int, int] | None
 ) -> Sequence[RecordedTopic]:
-    topics: dict[tuple[str, str], RecordedTopic] = {}
+    topics = []
     # Many topics may have the same one.
     definitions = {
         number: schema.data.decode(errors='replace')
@@ -339,33 +337,25 @@ def _describe_topics(
         if schema.encoding == 'ros2msg'
     }
     for number, channel in summary.channels.items():
-        count = None if counts is None else counts.get(number, 0)
         schema = summary.schemas.get(channel.schema_id)
-        definition = definitions.get(channel.schema_id, '')
-        topic = _describe_topic(channel, schema.name if schema else '', definition, count)
-        key = topic.name, topic.type
-        topics[key] = joined(topics[key], topic) if key in topics else topic
-    return list(topics.values())
-
-
-def _describe_topic(
-    channel: Channel, named: str, definition: str, count: int | None
-) -> RecordedTopic:
-    type_name = full_type_name(named)
-    problem = find_topic_name_problem(channel.topic) or ''
-    if channel.message_encoding != 'cdr':
-        problem = f"its messages are in '{channel.message_encoding}', not in the 'cdr' of ROS 2"
-    elif not type_name:
-        problem = f"'{named}' is no type of ROS" if named else 'its type was not recorded'
-    return RecordedTopic(
-        channel.topic,
-        type_name or named,
-        count,
-        channel.metadata.get(metadata.QOS_KEY, ''),
-        definition,
-        channel.metadata.get(metadata.HASH_KEY, ''),
-        problem,
-    )
+        named = schema.name if schema else ''
+        type_name, encoding = full_type_name(named), channel.message_encoding
+        problem = find_topic_name_problem(channel.topic) or ''
+        if encoding != 'cdr':
+            problem = f"its messages are in '{encoding}', not in the 'cdr' of ROS 2"
+        elif not type_name:
+            problem = f"'{named}' is no type of ROS" if named else 'its type was not recorded'
+        topic = RecordedTopic(
+            channel.topic,
+            type_name or named,
+            None if counts is None else counts.get(number, 0),
+            channel.metadata.get(metadata.QOS_KEY, ''),
+            definitions.get(channel.schema_id, ''),
+            channel.metadata.get(metadata.HASH_KEY, ''),
+            problem,
+        )
+        topics.append(topic)
+    return topics
 
 
 @contextmanager
