@@ -12,7 +12,7 @@ from composer.launch_files.parameters import ParameterReader
 from composer.launch_files.place import join_namespaces
 from composer.launch_files.substitutions import Resolver, class_names, private, truth_of
 from composer.launch_files.surroundings import Wait
-from composer.launch_files.texts import Computed, Text, chosen, joined, only_if
+from composer.launch_files.texts import Computed, Text, chosen, code_of, joined, only_if
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -202,7 +202,9 @@ class ProgramReader:
         }
         self._add_namespace(data, private(component, 'node_namespace'))
         self._add_parameters(data, private(component, 'parameters') or ())
-        self._add_remaps(data, private(component, 'remappings') or ())
+        # A generator of launch_ros: it gives the rules once, and several actions may load it.
+        rules = list(private(component, 'remappings') or ())
+        self._add_remaps(data, vars(component).setdefault('_composer_remappings', rules))
         extra: dict[str, Any] = {}
         for each in private(component, 'extra_arguments') or ():
             extra |= ParameterReader(place).values(each)
@@ -218,6 +220,8 @@ class ProgramReader:
         if not label:
             label, data['name'] = plugin.text.rpartition(':')[2], None
         components: dict[str, Any] = entry.data['components']
+        if label in components and components[label].get('namespace') != data.get('namespace'):
+            label = _full_name(data.pop('namespace', ''), label)
         if label in components and not when:
             place.remark(f"a second component '{label}' of one container is left out")
             return
@@ -354,6 +358,16 @@ class ProgramReader:
             )
             total = sum(float(each.text or 5) for each in timeouts)
             data['stop'] = {'timeout': Computed(f'{{{{ {" + ".join(terms)} }}}}', total)}
+
+
+def _full_name(namespace: str, name: str) -> str:
+    """Return the name with the namespace, from the root, as the key of a component."""
+    values = [each.value if isinstance(each, Computed) else each for each in (namespace, name)]
+    text = re.sub('/+', '/', '/'.join(('', *values)))
+    if not isinstance(namespace, Computed) and not isinstance(name, Computed):
+        return text
+    code = f"('/' ~ {code_of(namespace)} ~ '/' ~ {code_of(name)})"
+    return Computed(f"{{{{ {code} | replace('//', '/') | replace('//', '/') }}}}", text)
 
 
 def _text_of(value: Any) -> str:

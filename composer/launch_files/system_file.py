@@ -128,6 +128,15 @@ def _finished(
     if entry.when:
         data['when'] = Computed(f'{{{{ {entry.when} }}}}', entry.holds)
     data |= entry.data
+    if 'components' in data:
+        # The entry may be written once more, with its parameter files as they are in it.
+        data['components'] = {label: {**each} for label, each in data['components'].items()}
+    if entry.section == 'containers' and entry.action is None:
+        # A container that runs already is needed while there are components for it.
+        codes = dict.fromkeys(each.get('when') for each in data['components'].values())
+        if codes and None not in codes:
+            terms = ' or '.join(f'({code[3:-3]})' for code in codes if code)
+            data = {'when': Computed(f'{{{{ {terms} }}}}', entry.holds), **data}
     env = {
         name: value.written()
         for name, value in entry.environment.items()

@@ -155,19 +155,19 @@ def only_if(condition: str, value: Any, otherwise: Any, *, is_true: bool) -> Any
     """Return a value of the language if a condition holds, else another one; `None` is none."""
     if not condition:
         return value
-    code = f'{_code_of(value)} if {condition} else {_code_of(otherwise)}'
+    code = f'{code_of(value)} if {condition} else {code_of(otherwise)}'
     now = value if is_true else otherwise
     return Computed(f'{{{{ {code} }}}}', now.value if isinstance(now, Computed) else now)
 
 
-def _code_of(value: Any) -> str:
+def code_of(value: Any) -> str:
     """Return an expression for a value of the language."""
     if isinstance(value, Computed):
         pieces = re.split(r'{{ (.*?) }}(?!})', value)
         codes = [f'({piece})' if i % 2 else repr(piece) for i, piece in enumerate(pieces) if piece]
         return ' ~ '.join(codes) if len(codes) == 1 else f'({" ~ ".join(codes)})'
     if isinstance(value, list):
-        return f'[{", ".join(map(_code_of, value))}]'
+        return f'[{", ".join(map(code_of, value))}]'
     return {'None': 'none', 'True': 'true', 'False': 'false'}.get(repr(value), repr(value))
 
 

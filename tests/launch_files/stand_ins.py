@@ -185,6 +185,20 @@ class Node(ExecuteLocal):
         self.arguments, self.ros_arguments = keys.get('arguments'), keys.get('ros_arguments')
 
 
+class ComposableNode:
+    def __init__(self, name, namespace=None, remappings=()):
+        self.node_name, self.node_namespace, self.condition = name, namespace, None
+        self.package, self.node_plugin = 'image_proc', 'image_proc::Rectify'
+        # As in launch_ros: they can be read once.
+        self.remappings = iter(remappings)
+
+
+class LoadComposableNodes(Entity):
+    def __init__(self, target, components, condition=None):
+        super().__init__(condition)
+        self.target_container, self.composable_node_descriptions = target, components
+
+
 class ParameterFile:
     def __init__(self, param_file):
         self.param_file, self.allow_substs = param_file, False

@@ -226,6 +226,33 @@ def test_an_absolute_argument_replaces_what_it_is_joined_to(tmp_path, parts, giv
     )
 
 
+def test_components_of_one_name_in_two_namespaces_and_containers(tmp_path):
+    components = [
+        launch.ComposableNode('rectify', namespace, remappings=[('image', 'image_mono')])
+        for namespace in ('front', [SIDE, '_side'], ['/', SIDE], 'rear')
+    ]
+    system = read(
+        launch.DeclareLaunchArgument('other', ''),
+        launch.LoadComposableNodes('/all', components),
+        launch.LoadComposableNodes(
+            launch.LaunchConfiguration('other'), components, launch.IfCondition(SIM)
+        ),
+    )
+    for words, side, containers in (
+        ([], 'left', {'/all'}),
+        (['sim:=true', 'side:=right', 'other:=box'], 'right', {'/all', '/box'}),
+    ):
+        processes = resolved(tmp_path, system, *words)
+        assert {process.full_name for process in processes.values()} == containers
+        for process in processes.values():
+            found = {
+                (each.namespace, each.name, each.remap) for each in process.components.values()
+            }
+            namespaces = ('/front', f'/{side}_side', f'/{side}', '/rear')
+            rules = (('image', 'image_mono'),)
+            assert found == {(namespace, 'rectify', rules) for namespace in namespaces}
+
+
 def test_what_begins_when_another_ends_waits_for_it(tmp_path):
     first = node(name='first')
     handler = launch.OnProcessExit(first, [node(name='second')])
