@@ -129,7 +129,7 @@ class ProgramReader:
             data['arguments'] = words
         elif ros_arguments:
             data['command'] += words[len(own) :]
-        self._add_parameters(data, private(action, 'parameters') or ())
+        self._add_parameters(data, private(action, 'parameters') or (), is_dumped=True)
         self._add_remaps(data, private(action, 'remappings') or ())
         if level is not None:
             data['log_level'] = level
@@ -277,9 +277,11 @@ class ProgramReader:
         elif written is not None:
             data['namespace'] = '/'
 
-    def _add_parameters(self, data: dict[str, Any], written: Any) -> None:
+    def _add_parameters(
+        self, data: dict[str, Any], written: Any, *, is_dumped: bool = False
+    ) -> None:
         place = self._place
-        parameters = ParameterReader(place)
+        parameters = ParameterReader(place, is_dumped=is_dumped)
         common = place.scope.configurations.get('global_params', ())
         read = parameters.read(written, common)
         if read.values:

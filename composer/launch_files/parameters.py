@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
 from composer.launch_files.substitutions import Resolver, class_names, private, read_file
 from composer.launch_files.texts import Computed, Text, only_if, read_yaml
+from composer.ros_parameters.rcl_values import parse_override
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -43,10 +46,15 @@ class NewFile:
 
 
 class ParameterReader:
-    """Reads the parameters of nodes at one place of a launch file."""
+    """Reads the parameters of nodes at one place of a launch file.
 
-    def __init__(self, place: Place) -> None:
+    Args:
+        is_dumped: Whether launch writes values to files, as for all but components.
+    """
+
+    def __init__(self, place: Place, *, is_dumped: bool = False) -> None:
         self._place = place
+        self._is_dumped = is_dumped
         self._resolver = Resolver(place)
         self._remark = place.remark
         self._parse = place.loader.parse
@@ -135,6 +143,8 @@ class ParameterReader:
         return {'command': [word.written() for word in words]} if words else None
 
     def _add_values(self, read: Parameters, values: dict[str, Any]) -> None:
+        if self._is_dumped:
+            values = {name: _as_dumped(value) for name, value in values.items()}
         if not read.files:
             read.values |= values
             return
@@ -185,7 +195,7 @@ class ParameterReader:
             return False
         resolver = self._resolver
         path = resolver.text(private(written, 'source_file'))
-        data = read_file(path.text)
+        data = read_file(path.text, is_dumped=True)
         has_substitutions = is_template and '$(' in str(data)
         if not isinstance(data, dict) or any('.' in key for key in rewrites):
             return False
@@ -200,8 +210,9 @@ class ParameterReader:
         root = resolver.text(private(written, 'root_key')).written()
         # What else is in the file, and where, is that of the file as it is now.
         self._place.result.freeze(path)
-        if has_substitutions:
-            read.files.append(NewFile(self._translated(data), root))
+        if has_substitutions or data != read_file(path.text):
+            copied = self._translated(data) if is_template else data
+            read.files.append(NewFile(copied, root))
         else:
             read.files.append({'file': path.written(), 'root': root} if root else path.written())
         changed = _rewritten(data, by_name, by_value)
@@ -241,6 +252,14 @@ def _rewritten(data: Any, by_name: dict[str, Any], by_value: dict[str, Any]) -> 
         elif isinstance(value, str) and value in by_value:
             changed[key] = by_value[value]
     return changed
+
+
+def _as_dumped(value: Any) -> Any:
+    """Return a value as ROS reads what PyYAML writes: the text `1e-10` has no quotes there."""
+    if isinstance(value, list):
+        return [_as_dumped(item) for item in value]
+    read = parse_override(yaml.safe_dump(value)) if type(value) is str else None
+    return read[0] if read and isinstance(read[0], float) else value
 
 
 def _names_in(file: Any) -> set[str]:

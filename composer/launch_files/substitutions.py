@@ -26,9 +26,10 @@ from composer.launch_files.texts import (
     read_yaml,
     split_words,
 )
+from composer.ros_parameters.rcl_values import read_plain_scalar
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
     from composer.launch_files.place import Place
 
@@ -293,18 +294,30 @@ def text_of(text: str) -> Text:
     return Text(tuple(part for part in parts if part))
 
 
-class _RclLoader(yaml.SafeLoader):
-    """Reads `1e-6` as a number, as ROS does."""
+class _RosLoader(yaml.BaseLoader):
+    """Reads keys and values as ROS does: `no` is a text as a key, and `1e-6` a number."""
+
+    def construct_scalar(self, node: Any) -> Any:
+        """Return the value of a scalar."""
+        return node.value if node.style in ('"', "'") else read_plain_scalar(node.value)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Hashable, Any]:  # noqa: FBT001, FBT002, ARG002 - of PyYAML
+        """Return a mapping, with its keys as they are written."""
+        return {
+            str(key.value): self.construct_object(value, deep=True) for key, value in node.value
+        }
 
 
-_NUMBER = re.compile(r'[-+]?\d+[eE][-+]?\d+')
-_RclLoader.add_implicit_resolver('tag:yaml.org,2002:float', _NUMBER, list('-+0123456789'))
+def read_file(path: str, *, is_dumped: bool = False) -> Any:
+    """Return the data of a YAML file as ROS reads them; `None` if it has none.
 
-
-def read_file(path: str) -> Any:
-    """Return the data of a YAML file; `None` if it has none."""
+    Args:
+        is_dumped: Whether launch reads the file and writes it anew, with PyYAML.
+    """
     try:
-        return yaml.load(Path(path).read_text(encoding='utf-8'), _RclLoader)  # noqa: S506
+        text = Path(path).read_text(encoding='utf-8')
+        text = yaml.safe_dump(yaml.safe_load(text)) if is_dumped else text
+        return yaml.load(text, _RosLoader)  # noqa: S506 - makes plain data
     except (OSError, ValueError, yaml.YAMLError):
         return None
 

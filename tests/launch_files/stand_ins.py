@@ -204,6 +204,14 @@ class ParameterFile:
         self.param_file, self.allow_substs = param_file, False
 
 
+class RewrittenYaml(Substitution):
+    """As that of nav2."""
+
+    def __init__(self, source_file, param_rewrites):
+        self.source_file, self.param_rewrites = source_file, param_rewrites
+        self.convert_types, self.root_key = True, None
+
+
 class Context:
     def __init__(self):
         self.names = []

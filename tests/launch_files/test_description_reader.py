@@ -13,6 +13,7 @@ from composer.launch_files.place import Place
 from composer.launch_files.results import LaunchError
 from composer.launch_files.system_file import render_system
 from composer.launch_files.texts import Text, joined, one, split_words
+from composer.ros_parameters.file_reader import parse_parameter_file
 from tests.launch_files import stand_ins as launch
 
 SIDE = launch.LaunchConfiguration('side')
@@ -59,6 +60,11 @@ def resolved(tmp_path, system, *words):
         (
             node(parameters=[{'text': (launch.TextSubstitution('1.5'),)}]),
             {'parameters': {'text': 1.5}},
+        ),
+        # launch writes it to a file without quotes.
+        (
+            node(parameters=[{'x': (launch.TextSubstitution("'2e5'"),), 'y': '1', 'z': '1e5'}]),
+            {'parameters': {'x': 2e5, 'y': '1', 'z': 1e5}},
         ),
         (node(respawn=True, respawn_delay=2.0), {'restart': {'when': 'always', 'delay': 2.0}}),
         (node(on_exit=launch.Shutdown()), {'on_exit': 'shutdown'}),
@@ -287,6 +293,21 @@ def test_values_after_a_file_that_has_them_too_are_in_a_file_of_their_own(tmp_pa
     assert yaml.safe_load(system.files['x.params/a.yaml']) == {
         '/**/a': {'ros__parameters': {'y': 2, 'z': 3}}
     }
+
+
+def test_a_rewritten_file_is_read_as_launch_reads_it(tmp_path):
+    """PyYAML takes the key `no` for false, and writes a text that is a number without quotes."""
+    (tmp_path / 'own.yaml').write_text("a: {ros__parameters: {no: 1, x: '1e-10', y: 1e-10, z: a}}")
+    rewritten = launch.RewrittenYaml(str(tmp_path / 'own.yaml'), {'z': 'b'})
+    system = read(node(name='a', parameters=[launch.ParameterFile([rewritten])]))
+    data = yaml.safe_load(system.text)['processes']['a']
+    found = [
+        parse_parameter_file(system.files[name], name).entries for name in data['parameter_files']
+    ]
+    assert [[(each.name, each.value) for each in entries] for entries in found] == [
+        [('false', 1), ('x', 1e-10), ('y', 1e-10), ('z', 'a')],
+        [('z', 'b')],
+    ]
 
 
 @pytest.mark.parametrize('is_scoped', [False, True], ids=['plain', 'in a group'])
