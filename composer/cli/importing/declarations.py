@@ -32,8 +32,8 @@ def import_command(
     This runs the code of the launch file, and the commands in it: import only what you trust.
 
     It is resolved by the installed launch and launch_ros, with these values for its arguments. All
-    of its arguments remain arguments of the system. What cannot be kept is a comment with the line
-    that it comes from.
+    of its arguments remain arguments of the system; those that Python code of it reads keep these
+    values. What cannot be kept is a comment with the line that it comes from.
     """
     from composer.cli.importing.import_launch import import_launch_file
 
