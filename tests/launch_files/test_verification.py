@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from composer.interfaces.build.build_cache import find_cache
 from composer.launch_files.verification.comparison import pair
 from composer.launch_files.verification.given import read_given
 
@@ -65,6 +66,19 @@ def test_each_difference_is_told():
         '+parameter: x = 1.0',
         '+environment: LEVEL=2',
     ]
+
+
+def test_packages_that_composer_builds_are_no_difference():
+    built = f'{find_cache()}/x_interfaces-1'
+    one = given(*NAMED, AMENT_PREFIX_PATH='/opt', PYTHONPATH=f'/a:{built}/python')
+    other = given(
+        *NAMED,
+        AMENT_PREFIX_PATH=f'{built}:/opt',
+        PYTHONPATH=f'{built}/python:/a',
+        LD_LIBRARY_PATH=f'{built}/lib',
+    )
+    (found,) = pair([one], [other])
+    assert found.is_same, list(found.difference())
 
 
 def test_a_text_is_no_number():

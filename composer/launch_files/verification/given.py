@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from composer.interfaces.build.build_cache import find_cache
 from composer.names import expand_namespace, join_names
 from composer.ros_parameters.file_reader import parse_parameter_file
 from composer.ros_parameters.node_patterns import matches_pattern
@@ -109,7 +110,7 @@ def read_given(written: Mapping[str, Any], replaced: Mapping[str, str]) -> Given
     given.parameters = _merged(values, given)
     given.environment = {
         key: _replace(value, replaced)
-        for key, value in written['env'].items()
+        for key, value in _without_built(written['env'])
         if not _NOT_COMPARED.fullmatch(key)
     }
     given.folder = _replace(written['cwd'], replaced)
@@ -127,6 +128,17 @@ def _read_component(written: Mapping[str, Any]) -> Given:
     given.parameters = dict(_flat(written['parameters'], ''))
     given.others = [f'{key} = {value}' for key, value in written['extra'].items() if value]
     return given
+
+
+def _without_built(environment: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield the variables, without the interface packages that Composer has built in paths."""
+    built = re.compile(rf'{re.escape(str(find_cache()))}/[^:]*:?')
+    for name, value in environment.items():
+        plain, count = built.subn('', value)
+        if not count:
+            yield name, value
+        elif rest := plain.rstrip(':'):
+            yield name, rest
 
 
 def _add_remap(given: Given, rule: str) -> None:
