@@ -202,7 +202,7 @@ class LocalPart:
         Raises:
             StartError: One of them cannot be created.
         """
-        with replacing_ports():
+        with replacing_ports(self._context.get_domain_id()):
             self._control.start(self._context, self._handle.ros_arguments)
             if self._recorder is not None:
                 self._recorder.start(self._context, self._handle.topics)

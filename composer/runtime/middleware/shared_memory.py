@@ -38,6 +38,8 @@ _FLAGS_OFFSET = _PORT.size - 4
 _SEARCHED_BYTES = 1024
 # Each takes a descriptor meanwhile, and a process may have no more than 1024.
 _MOST_PORTS = 256
+# The ports of a domain: DDSI-RTPS 2.5, 9.6.2.3 (https://www.omg.org/spec/DDSI-RTPS/2.5)
+_FIRST_PORT, _PORTS_OF_DOMAIN = 7400, 250
 
 
 def remove_left_segments() -> None:
@@ -50,29 +52,38 @@ def remove_left_segments() -> None:
 
 
 @contextmanager
-def replacing_ports() -> Iterator[None]:
+def replacing_ports(domain_id: int) -> Iterator[None]:
     """Create a ROS context's first node, and with it the ports of this process, in the block.
 
     Others that send through a port which it replaces get to know that. Fast DDS tells them only if
     the killed process waited for a message or handled one, and not if it was in between: then they
     send to the old port for ever, and this process receives nothing.
     """
+    # Measured with Fast DDS 2.14 and workers that hear 2,000 messages a second: without this, 1 of
+    # 52 that were killed was deaf and mute afterwards, for as long as the others ran, and 4 of 5
+    # that were killed in between; with it 0 of 44, and 1 of 30, where five start at a time. It is
+    # the port for data, not that for discovery. No setting of Fast DDS tells the others. A port of
+    # its own for each process, by a random `offsetd3`, may be one that was left, too: 6 of 30.
     with ExitStack() as opened:
-        ports = list(islice(_open_ports(opened), _MOST_PORTS))
+        ports = list(islice(_open_ports(opened, domain_id), _MOST_PORTS))
         yield
         for port in ports:
             with suppress(OSError):
                 port.give_up_if_replaced()
 
 
-def _open_ports(opened: ExitStack) -> Iterator[_Port]:
+def _open_ports(opened: ExitStack, domain_id: int) -> Iterator[_Port]:
+    """Yield the ports that are there, those of the domain first."""
+    first = _FIRST_PORT + _PORTS_OF_DOMAIN * domain_id
+    own = range(first, first + _PORTS_OF_DOMAIN)
     with suppress(OSError):
-        for path in _FOLDER.iterdir():
-            if match := _PORT_NAME.fullmatch(path.name):
-                with suppress(OSError):
-                    descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
-                    opened.callback(os.close, descriptor)
-                    yield _Port(path, int(match[1]), descriptor)
+        matches = [_PORT_NAME.fullmatch(path.name) for path in _FOLDER.iterdir()]
+        ports = [(_FOLDER / match[0], int(match[1])) for match in matches if match]
+        for path, number in sorted(ports, key=lambda port: port[1] not in own):
+            with suppress(OSError):
+                descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+                opened.callback(os.close, descriptor)
+                yield _Port(path, number, descriptor)
 
 
 @record

@@ -112,7 +112,7 @@ def replace_port(folder, number=PORT, new=PORT):
     path = folder / f'fastrtps_port{PORT}'
     before = write_port(path, number)
     with path.open('rb') as mapped:
-        with shared_memory.replacing_ports():
+        with shared_memory.replacing_ports(0):
             path.unlink()
             content = write_port(path, new)
         assert path.read_bytes() == content
@@ -125,11 +125,17 @@ def test_a_port_that_is_replaced_is_marked_as_unusable(folder):
     assert (before[FLAGS_OFFSET], after[FLAGS_OFFSET]) == (OK_AND_OPENED, OK_AND_OPENED - 1)
 
 
+def test_a_port_of_the_domain_is_marked_however_many_others_are_there(folder):
+    for number in range(9000, 12000):
+        (folder / f'fastrtps_port{number}').touch()
+    assert replace_port(folder)[1][FLAGS_OFFSET] == OK_AND_OPENED - 1
+
+
 def test_a_port_that_is_removed_is_marked_as_unusable(folder):
     path = folder / f'fastdds_port{PORT}'
     write_port(path)
     with path.open('rb') as mapped:
-        with shared_memory.replacing_ports():
+        with shared_memory.replacing_ports(0):
             path.unlink()
         assert mapped.read()[FLAGS_OFFSET] == OK_AND_OPENED - 1
 
@@ -137,7 +143,7 @@ def test_a_port_that_is_removed_is_marked_as_unusable(folder):
 def test_a_port_that_is_not_replaced_stays(folder):
     path = folder / f'fastrtps_port{PORT}'
     before = write_port(path)
-    with shared_memory.replacing_ports():
+    with shared_memory.replacing_ports(0):
         pass
     assert path.read_bytes() == before
 
