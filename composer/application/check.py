@@ -11,6 +11,7 @@ from composer.application.file_selection import (
     read_standard_input,
     select_systems,
 )
+from composer.application.launch_file import is_launch_file, load_launch_file, relocate
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.placement.crossings import list_crossings
@@ -88,7 +89,7 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
         checked = []
         for given, combination, system in _load(selected, options):
             context = create_context(system, catalogue)
-            findings = absent.leave_out(check_in_context(system, context, further))
+            findings = relocate(absent.leave_out(check_in_context(system, context, further)))
             kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
             nodes = len(system.spec.nodes) if system.spec else None
             crossings = tuple(map(str, list_crossings(context))) if context else ()
@@ -153,6 +154,9 @@ def _load(
     path, text = read_standard_input(selected.path, options.stdin_name)
     layers, arguments, set_values = selected.layers, selected.arguments, options.set_values
     given = ' '.join([*map(str, layers), *arguments, *map('--set {}'.format, set_values)])
+    if text is None and is_launch_file(path):
+        yield given, None, load_launch_file(path, arguments, layers, set_values)
+        return
     if arguments or set_values:
         words = arguments or None
         yield (

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from composer.application.launch_file import LAUNCH_SUFFIXES, is_launch_file, load_launch_file
 from composer.diagnostics import Diagnostic, has_errors
 from composer.entity_kinds import WORK_KEYS
 from composer.errors import UsageError
@@ -149,7 +150,8 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     if os.path.isdir(words[0]):
         raise _folder_error(words[0])
     count = 1
-    while count < len(words) and words[count].endswith(_SUFFIXES) and ':=' not in words[count]:
+    suffixes = (*_SUFFIXES, *LAUNCH_SUFFIXES) if words[0].endswith(LAUNCH_SUFFIXES) else _SUFFIXES
+    while count < len(words) and words[count].endswith(suffixes) and ':=' not in words[count]:
         count += 1
     return [Path(word) for word in words[:count]], list(words[count:])
 
@@ -183,10 +185,13 @@ def load_given(
     set_values: Sequence[str] = (),
     before: LoadedSystem | None = None,
     reader: StartValueReader | None = None,
+    *,
+    is_shown: bool = False,
 ) -> LoadedSystem:
     """Return the system that a command line gives: a file, its layers and arguments.
 
     Args:
+        is_shown: Whether it is looked at and not run: then it may be a launch file.
         before: A system whose records are kept where the data are the same.
         reader: Reads the values that are known when the system starts, if the file has no errors;
             `None` for samples.
@@ -195,6 +200,8 @@ def load_given(
         UsageError: The words or the values to set do not fit the file.
         StartValueError: A value that is known when the system starts cannot be read.
     """
+    if is_shown and is_launch_file(paths[0]):
+        return load_launch_file(paths[0], words or (), paths[1:], set_values)
     load = create_loader(paths, words, set_values, before)
     system = load()
     if reader is None or not system.start.found or has_errors(system.diagnostics):

@@ -66,10 +66,10 @@ def plan(
     if len(paths) == 1 and str(paths[0]) != '-':
         read_as = [paths[0], *layers]
         try:
-            spec = load_given(read_as, words or None).spec
+            spec = load_given(read_as, words or None, is_shown=True).spec
         except UsageError:
             # The running system may have more words; without any, there are samples.
-            spec = load_given(read_as).spec
+            spec = load_given(read_as, is_shown=True).spec
         running = _ask_running(spec, host) if spec else ''
         if isinstance(running, str) and running:
             given = read_answer(running, SNAPSHOT)['given']
@@ -135,7 +135,8 @@ def _read(
 ) -> tuple[CheckContext | None, Sequence[Diagnostic]]:
     """Return the context of a system, and what was found in it."""
     before_system = before.system if before else None
-    system = load_given(paths, words, set_values, before_system, StartValueReader(host))
+    reader = StartValueReader(host)
+    system = load_given(paths, words, set_values, before_system, reader, is_shown=True)
     context = create_context(system, InterfaceCatalogue(), before)
     findings = check_in_context(system, context, host=host) if checks else system.diagnostics
     return context, findings

@@ -133,6 +133,7 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
     nodes: list[NodeSpec | ComponentSpec] = [*spec.nodes.values()]
     nodes += [component for component in spec.components if component.is_named]
     named = {name: process for process in spec.processes.values() for name in process.named_nodes}
+    yield from _check_names_of_processes(context)
     for node in nodes:
         other = first.setdefault(node.full_name, node)
         if other is not node and not _are_misplaced(context, node, other):
@@ -152,6 +153,29 @@ def check_full_names(context: CheckContext) -> Iterator[Diagnostic]:
                 help="give one of them another name, or a 'namespace'",
                 related=[Related('the other one', context.system.positions.key(node.path))],
             )
+
+
+def _check_names_of_processes(context: CheckContext) -> Iterator[Diagnostic]:
+    """Report nodes of two processes that run at the same time."""
+    first: dict[str, ProcessSpec] = {}
+    for process in context.spec.processes.values():
+        for name in process.named_nodes:
+            other = first.setdefault(name, process)
+            is_alone = other is process or process.on_demand or other.on_demand
+            if is_alone or _follows(process, other) or _follows(other, process):
+                continue
+            yield context.at_value(
+                (*process.path, 'name'),
+                'duplicate-node',
+                f"a node '{name}' already exists",
+                help="give one of them another name, or a 'namespace'",
+                related=[context.related_value((*other.path, 'name'), 'the other one')],
+            )
+
+
+def _follows(process: ProcessSpec, other: ProcessSpec) -> bool:
+    """Return whether one waits until the other has ended."""
+    return any(each.kind == 'process' and each.name == other.name for each in process.wait_for)
 
 
 def _are_misplaced(context: CheckContext, *nodes: NodeSpec | ComponentSpec) -> bool:

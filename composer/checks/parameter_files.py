@@ -203,8 +203,9 @@ def _nodes_of(
         # A container gives its own files to none of its components.
         return {owner.full_name: None}
     nodes: dict[str | None, NodeSpec | DeclaredNodeSpec | None] = {}
-    if owner.node_name is not None and owner.namespace is not None:
-        nodes[join_names(owner.namespace, owner.node_name)] = declared.get(owner.path)
+    if owner.node_name is not None:
+        # Hardly any program has a namespace of its own.
+        nodes[join_names(owner.namespace or '/', owner.node_name)] = declared.get(owner.path)
     for node in owner.nodes if _lists_nodes(owner) else ():
         nodes[node.full_name] = node
     return nodes or {None: None}

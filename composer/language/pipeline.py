@@ -29,7 +29,7 @@ from composer.schema.structure import check_structure
 from composer.yaml_text.reader import parse_document, read_document, refuse_launch_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from composer.language.arguments import GiveValues
     from composer.language.values.start_values import ReadValue
@@ -42,7 +42,7 @@ def load_system(
     *,
     layers: Sequence[Path] = (),
     set_values: Sequence[str] = (),
-    text: bytes | None = None,
+    text: bytes | Callable[[], Document] | None = None,
     before: LoadedSystem | None = None,
     read_value: ReadValue | None = None,
 ) -> LoadedSystem:
@@ -53,7 +53,7 @@ def load_system(
             with samples where there are none.
         layers: Files that change the first one, each over those before it.
         set_values: Changes of single values, as in `nodes.talker.log_level=debug`.
-        text: The text of the file, if it is not to be read.
+        text: The text of the file, if it is not to be read; or what reads it.
         before: A system whose records are kept where the data are the same.
         read_value: Reads the values that are known when the system starts; `None` for samples.
 
@@ -118,9 +118,12 @@ def load_system_text(
     return _load(document, path, partial(values_from_words, words=words))
 
 
-def _read(paths: Sequence[Path], text: bytes | None) -> Document:
+def _read(paths: Sequence[Path], text: bytes | Callable[[], Document] | None) -> Document:
     path, *layers = paths
-    main = read_document(path) if text is None else parse_document(text, str(path))
+    if callable(text):
+        main = text()
+    else:
+        main = read_document(path) if text is None else parse_document(text, str(path))
     return merge_documents([main, *map(read_document, layers)])
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
 from composer.errors import ComposerError
-from composer.launch_files.results import LaunchError
+from composer.launch_files.results import LaunchError, Origin
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,9 +90,9 @@ class Loader:
         module = importlib.import_module('launch.frontend.parse_substitution')
         return module.parse_substitution(text)
 
-    def origin_of(self, entity: Any) -> str:
-        """Return where an action was made, as in `line 42 of x.launch.py`; or ''."""
-        return getattr(entity, '_composer_origin', '')
+    def origin_of(self, entity: Any) -> Origin:
+        """Return where an action was made."""
+        return getattr(entity, '_composer_origin', Origin())
 
     @contextmanager
     def reading(self) -> Iterator[list[str]]:
@@ -158,8 +158,8 @@ class _Origins:
 
     def __init__(self, folders: tuple[str, ...]) -> None:
         self._folders = (*folders, f'{Path(__file__).parent}/')
-        self._elements: list[str] = []
-        self._lines: dict[int, str] = {}
+        self._elements: list[Origin] = []
+        self._lines: dict[int, Origin] = {}
         self._roots: list[Any] = []
 
     @contextmanager
@@ -188,7 +188,7 @@ class _Origins:
     def _following(self, original: Any) -> Any:
         def parse(parser: Any, entity: Any) -> Any:
             element = getattr(entity, '_Entity__xml_element', None)
-            self._elements.append(self._lines.get(id(element), ''))
+            self._elements.append(self._lines.get(id(element), Origin()))
             try:
                 return original(parser, entity)
             finally:
@@ -205,23 +205,23 @@ class _Origins:
                 self._roots.append(root)  # an `id` is that of one object while it lives
                 numbers = _element_lines(Path(str(name)))
                 for element, line in zip(root.iter(), numbers, strict=False):
-                    self._lines[id(element)] = f'line {line} of {Path(str(name)).name}'
+                    self._lines[id(element)] = Origin(Path(str(name)), line)
             return entity, parser
 
         return load
 
-    def _element(self) -> str:
-        return self._elements[-1] if self._elements else ''
+    def _element(self) -> Origin:
+        return self._elements[-1] if self._elements else Origin()
 
-    def _line(self) -> str:
+    def _line(self) -> Origin:
         frame: Any = sys._getframe(2)  # noqa: SLF001 - as the module `inspect` does
         while frame is not None:
             name = frame.f_code.co_filename
             if not name.startswith((*self._folders, '<')):
                 is_launch_file = '/composer/' not in name and not name.startswith(sys.base_prefix)
-                return f'line {frame.f_lineno} of {Path(name).name}' if is_launch_file else ''
+                return Origin(Path(name), frame.f_lineno) if is_launch_file else Origin()
             frame = frame.f_back
-        return ''
+        return Origin()
 
 
 def _element_lines(path: Path) -> list[int]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from composer.errors import ComposerError
 from composer.expressions import written_in_expression
-from composer.launch_files.results import Argument, Entry, Imported, LaunchError
+from composer.launch_files.results import Argument, Entry, Imported, LaunchError, Origin
 from composer.launch_files.surroundings import Scope
 from composer.launch_files.texts import Computed, Text, joined, one
 
@@ -34,7 +34,7 @@ class Place:
         self.given = given
         self.scope = Scope()
         self.result = Imported(given=given)
-        self.origin = ''
+        self.origin = Origin()
         self.depth = 0
 
     def remark(self, text: str) -> None:
@@ -62,7 +62,7 @@ class Place:
 
     def declare_rest(self) -> None:
         """Declare the arguments of the import that nothing declares: code may have read them."""
-        self.origin = ''
+        self.origin = Origin()
         for name in self.given:
             if name not in self.result.arguments:
                 self.remark(f"no action declares the argument '{name}'")

@@ -8,7 +8,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from composer.errors import ComposerError
 from composer.expressions import written_in_expression
@@ -21,6 +21,26 @@ if TYPE_CHECKING:
 
 # A constant in an expression, and not the name in `args['name']`.
 _CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
+
+
+class Origin(str):
+    """Where an action was made, as in `line 42 of x.launch.py`; empty if nobody knows.
+
+    Attributes:
+        path: Its file.
+        line: Counted from 1; 0 if nobody knows.
+    """
+
+    path: Path
+    line: int
+
+    __slots__ = ('line', 'path')
+
+    def __new__(cls, path: Path = Path(), line: int = 0) -> Self:
+        """Return that of a line."""
+        origin = super().__new__(cls, f'line {line} of {path.name}' if line else '')
+        origin.path, origin.line = path, line
+        return origin
 
 
 class LaunchError(ComposerError):
@@ -59,7 +79,7 @@ class Entry:
     name: str
     data: dict[str, Any]
     action: Any
-    origin: str
+    origin: Origin
     when: str
     holds: bool
     waits: list[Wait]

@@ -15,7 +15,7 @@ from composer.terminal import escape
 from composer.yaml_text.writer import RCL, render_yaml
 
 if TYPE_CHECKING:
-    from composer.launch_files.results import Argument, Entry, Imported
+    from composer.launch_files.results import Argument, Entry, Imported, Origin
 
 _FIXED = 'Fixed by the import. For another value:'
 _SECTIONS = ('processes', 'containers')
@@ -25,10 +25,15 @@ _NAME = re.compile(r'[^A-Za-z0-9_.-]+')
 
 @dataclass
 class SystemFile:
-    """The text of a system, and the files beside it by their paths relative to it."""
+    """The text of a system, and the files beside it by their paths relative to it.
+
+    Attributes:
+        origins: Where its entries are from, by the lines in which they begin.
+    """
 
     text: str = ''
     files: dict[str, str] = field(default_factory=dict)
+    origins: dict[int, Origin] = field(default_factory=dict)
 
 
 def render_system(imported: Imported, source: Path, output: Path | None = None) -> SystemFile:
@@ -42,7 +47,7 @@ def render_system(imported: Imported, source: Path, output: Path | None = None) 
     # Not `resolve`: launch leaves links in its paths.
     folder = str(output.parent.absolute()) if output else None
     written = SystemFile()
-    lines: list[str] = []
+    lines = _head(imported, source, output)
     common = _common_environment(imported.entries)
     if common:
         lines += ['', render_yaml({'environment': common}).rstrip()]
@@ -53,6 +58,7 @@ def render_system(imported: Imported, source: Path, output: Path | None = None) 
         for entry in entries:
             data = _finished(imported, entry, common, written, stem)
             data = _from_here(_Copies(imported, written, f'{stem}.files').of(data), folder)
+            written.origins[len(lines) + 1] = entry.origin
             lines += [f'  # {_one_line(entry.origin)}'] if entry.origin else []
             lines += [f'  {line}' for line in render_yaml({entry.name: data}).splitlines()]
     if not imported.entries:
@@ -60,7 +66,7 @@ def render_system(imported: Imported, source: Path, output: Path | None = None) 
     if imported.remarks:
         lines += ['', '# Not kept as it was:']
         lines += [f'# {_one_line(remark)}' for remark in imported.remarks]
-    written.text = '\n'.join([*_head(imported, source, output), *lines]) + '\n'
+    written.text = '\n'.join(lines) + '\n'
     return written
 
 

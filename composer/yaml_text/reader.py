@@ -72,7 +72,7 @@ def parse_document(content: bytes, name: str) -> Document:
     text = decode_content(content, name)
     if isinstance(text, Diagnostic):
         return _without_data(text)
-    if any(f'\n{code}' in f'\n{text}' for code in _LAUNCH_CODE):
+    if is_launch_code(text):
         return _without_data(refuse_launch_file(name))
     positions = SourceMap(SourceFile(name, tuple(text.splitlines())))
     try:
@@ -94,6 +94,11 @@ def parse_document(content: bytes, name: str) -> Document:
         help="begin with 'version: 1'",
     )
     return Document(None, positions, [*findings, top])
+
+
+def is_launch_code(text: str) -> bool:
+    """Return whether a text is a launch file in Python or XML."""
+    return any(f'\n{code}' in f'\n{text}' for code in _LAUNCH_CODE)
 
 
 def refuse_launch_file(name: str) -> Diagnostic:

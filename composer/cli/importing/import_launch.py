@@ -14,7 +14,7 @@ from composer.diagnostics import errors_first
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.launch_files.importing import import_file
+from composer.launch_files.importing import import_file, read_words
 from composer.launch_files.system_file import render_system
 from composer.reports.text import render_finding
 from composer.rules import Severity
@@ -47,7 +47,7 @@ def import_launch_file(
         UsageError: The arguments are not of that form, or it is no launch file.
         ComposerError: It cannot be imported, or the output cannot be written.
     """
-    given = _read_words(words)
+    given = read_words(words)
     if path.suffix not in _ENDINGS:
         message = f"'{path}' is no launch file: it ends with none of {', '.join(_ENDINGS)}"
         raise UsageError(message)
@@ -95,18 +95,6 @@ def check_imported(path: Path, words: Sequence[str]) -> bool:
     if errors:
         click.echo('the system that was imported has errors', err=True)
     return bool(errors)
-
-
-def _read_words(words: Sequence[str]) -> dict[str, str]:
-    given = {}
-    for word in words:
-        name, separator, value = word.partition(':=')
-        if not separator or not name:
-            meant = word.replace('=', ':=', 1) if '=' in word else 'NAME:=VALUE'
-            message = f"'{word}' is no argument of a launch file"
-            raise UsageError(message, help=f'write {meant}')
-        given[name] = value
-    return given
 
 
 def _write(system: SystemFile, output: Path) -> Iterator[Path]:

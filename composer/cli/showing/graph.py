@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.application.file_selection import load_given
+from composer.application.launch_file import relocate
 from composer.application.output import show_findings, write_file
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
@@ -44,9 +45,9 @@ def graph(
         ComposerError: The drawing cannot be written.
     """
     format_name = format_name or _format_of(output)
-    system = load_given(paths, words, set_values)
+    system = load_given(paths, words, set_values, is_shown=True)
     context = create_context(system, InterfaceCatalogue())
-    findings = AbsentPackages().leave_out(check_in_context(system, context))
+    findings = relocate(AbsentPackages().leave_out(check_in_context(system, context)))
     if context is None:
         show_findings(findings)
         return ExitCode.FAILED

@@ -53,7 +53,7 @@ def show(
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_given(paths, words, set_values, reader=StartValueReader())
+    system = load_given(paths, words, set_values, reader=StartValueReader(), is_shown=True)
     show_findings(system.diagnostics)
     if has_errors(system.diagnostics):
         return ExitCode.FAILED
@@ -73,7 +73,7 @@ def show_arguments(paths: Sequence[Path], set_values: Sequence[str]) -> int:
     Raises:
         UsageError: `--set` does not fit the file.
     """
-    system = load_given(paths, set_values=set_values)
+    system = load_given(paths, set_values=set_values, is_shown=True)
     show_findings(system.diagnostics)
     click.echo(describe_arguments(system.arguments))
     return ExitCode.FAILED if has_errors(system.diagnostics) else ExitCode.DONE
@@ -85,7 +85,7 @@ def show_parameters(paths: Sequence[Path], words: Sequence[str], set_values: Seq
     Raises:
         UsageError: The arguments or `--set` do not fit the file.
     """
-    system = load_given(paths, words, set_values, reader=StartValueReader())
+    system = load_given(paths, words, set_values, reader=StartValueReader(), is_shown=True)
     findings = _check_parameters(system)
     show_findings(findings)
     if has_errors(findings) or system.spec is None:
