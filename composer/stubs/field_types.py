@@ -20,8 +20,6 @@ PAYLOADS = f'{SUPPORT}.payloads'
 _BUILTINS = ('bool', 'bytes', 'float', 'int', 'list', 'property', 'str', 'tuple')
 _FLOATS = ('float32', 'float64')
 _STRINGS = ('string', 'wstring')
-# What rclpy's `Time` and `Duration` stand for in payloads, by their `to_msg()`.
-_TIMES = ('builtin_interfaces/msg/Time', 'builtin_interfaces/msg/Duration')
 
 
 def is_writable(name: str) -> bool:
@@ -102,12 +100,12 @@ class FieldTypes:
         return f'{array}[{self.imports.take("numpy", kind)}]'
 
     def write(self, field_type: FieldType) -> str:
-        """Return the type of what a message's field takes."""
+        """Return the type of what a message's field takes, which converts no single value."""
         if field_type.array is None:
-            taken = self._taken(field_type)
-            if field_type.nested in _TIMES:
-                return f'{taken} | {self.imports.support("ToMsg")}[{taken}]'
-            return taken
+            if field_type.kind in _FLOATS:
+                return self.imports.support('PythonFloat')
+            is_byte = field_type.kind == 'byte'
+            return self._value(field_type) if is_byte else self._taken(field_type)
         item = self._taken(field_type)
         if field_type.kind in _FLOATS or field_type.kind in _ARRAY_INTEGERS:
             return f'{self.imports.take("typing", "Iterable")}[{item}]'

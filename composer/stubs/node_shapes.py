@@ -5,16 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.records import record
+from composer.stubs.stored_names import type_of_state
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from composer.inference.reading import CreatedEntity
     from composer.language.specs import NodeSpec, ParameterSpec
 
 # The types of the entities of one section, by name. Behaviours create some whose name or type is
 # not known: that is empty.
-_Types: TypeAlias = 'tuple[tuple[str, tuple[str, ...]], ...]'
+Types: TypeAlias = 'tuple[tuple[str, tuple[str, ...]], ...]'
 
 _PARAMETER_TYPES = {
     'bool': 'bool',
@@ -30,6 +31,10 @@ _PARAMETER_TYPES = {
 # The parameters that rclpy declares for every node.
 _OWN_PARAMETERS = {'use_sim_time': 'bool', 'start_type_description_service': 'bool'}
 _ANYTHING = 'Any'
+# Of the full name of a type: `std_msgs/msg/String`.
+_SLASHES = 2
+# The types of choices that a type can name.
+_NAMED = (bool, int, str)
 
 
 @record
@@ -41,41 +46,52 @@ class NodeShape:
         service_clients: The types of services, by client.
         action_clients: The types of actions, by client.
         parameters: The Python types of values, by parameter.
-        state: The names that `node.state` has; `None` if it may have any.
+        state: The types of what `node.state` has, by name; `None` if it may have any.
     """
 
-    publishers: _Types
-    service_clients: _Types
-    action_clients: _Types
-    parameters: _Types
-    state: tuple[str, ...] | None
+    publishers: Types
+    service_clients: Types
+    action_clients: Types
+    parameters: Types
+    state: Types | None
 
 
 def shape_of(
     node: NodeSpec,
-    stored: Sequence[frozenset[str] | None],
+    stored: Sequence[Mapping[str, frozenset[str]] | None],
     created: Sequence[CreatedEntity],
 ) -> NodeShape:
     """Return the shape of a node.
 
     Args:
-        stored: The names that each module of its behaviours may set in `node.state`; `None` for
-            one that may set any.
+        stored: What each module of its behaviours may set in `node.state`, as
+            `find_stored_names` returns it.
         created: What its behaviours create.
     """
-    parameters = {name: (_type_of(each),) for name, each in node.parameters.items()}
-    own = {name: (of_type,) for name, of_type in _OWN_PARAMETERS.items()}
     return NodeShape(
         _types(node.publishers, created, 'publisher'),
         _types(node.service_clients, created, 'service client'),
         _types(node.action_clients),
-        tuple(sorted({**own, **parameters}.items())),
-        None if None in stored else tuple(sorted({*node.state, *_all_of(stored)})),
+        parameter_types(node),
+        _state_of(node, stored),
     )
 
 
-def _all_of(stored: Iterable[Iterable[str] | None]) -> Iterator[str]:
-    return (name for names in stored for name in names or ())
+def _state_of(
+    node: NodeSpec, stored: Sequence[Mapping[str, frozenset[str]] | None]
+) -> Types | None:
+    known = [names for names in stored if names is not None]
+    if len(known) < len(stored):
+        return None
+    names = sorted({*node.state}.union(*known))
+    return tuple((name, (type_of_state(node.state.get(name), known, name),)) for name in names)
+
+
+def parameter_types(node: NodeSpec) -> Types:
+    """Return the Python types of a node's parameters, with those that rclpy declares."""
+    parameters = {name: (_type_of(each),) for name, each in node.parameters.items()}
+    own = {name: (of_type,) for name, of_type in _OWN_PARAMETERS.items()}
+    return tuple(sorted({**own, **parameters}.items()))
 
 
 def merge_shapes(shapes: Iterable[NodeShape]) -> NodeShape:
@@ -86,17 +102,17 @@ def merge_shapes(shapes: Iterable[NodeShape]) -> NodeShape:
     several = list(dict.fromkeys(shapes))
     if len(several) == 1:
         return several[0]
-    states = [shape.state for shape in several]
+    states = [shape.state for shape in several if shape.state is not None]
     return NodeShape(
         _merged(shape.publishers for shape in several),
         _merged(shape.service_clients for shape in several),
         _merged(shape.action_clients for shape in several),
         _merged(shape.parameters for shape in several),
-        None if None in states else tuple(sorted({*_all_of(states)})),
+        _merged(states) if len(states) == len(several) else None,
     )
 
 
-def _merged(sections: Iterable[_Types]) -> _Types:
+def _merged(sections: Iterable[Types]) -> Types:
     merged: dict[str, dict[str, None]] = {}
     for section in sections:
         for name, types in section:
@@ -108,10 +124,15 @@ def _merged(sections: Iterable[_Types]) -> _Types:
 
 def _types(
     entities: Mapping[str, Any], created: Iterable[CreatedEntity] = (), kind: str = ''
-) -> _Types:
+) -> Types:
     declared = [(name, (each.type,)) for name, each in entities.items()]
-    made = [(each.name or '', (each.type or '',)) for each in created if each.kind == kind]
+    made = [(each.name or '', (_full_name(each),)) for each in created if each.kind == kind]
     return _merged([(*declared, *made)])
+
+
+def _full_name(created: CreatedEntity) -> str:
+    """Return the type of what a behaviour creates; empty if what it gives is none."""
+    return created.type if created.type and created.type.count('/') == _SLASHES else ''
 
 
 def _type_of(parameter: ParameterSpec) -> str:
@@ -119,6 +140,8 @@ def _type_of(parameter: ParameterSpec) -> str:
 
     One that is not set has the value `None`, until somebody sets it.
     """
-    if parameter.value is None or parameter.type is None:
-        return _ANYTHING
-    return _PARAMETER_TYPES.get(parameter.type, _ANYTHING)
+    of_type = _PARAMETER_TYPES.get(parameter.type or '', _ANYTHING)
+    choices = parameter.choices or ()
+    if of_type in ('int', 'str') and choices and all(type(each) in _NAMED for each in choices):
+        of_type = f'Literal[{", ".join(map(repr, choices))}]'
+    return f'{of_type} | None' if parameter.value is None and of_type != _ANYTHING else of_type

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from composer.records import record
 from composer.stubs.field_types import StubImports, is_writable
+from composer.stubs.node_shapes import parameter_types
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from composer.stubs.node_shapes import NodeShape
+    from composer.language.specs import NodeSpec
+    from composer.stubs.node_shapes import NodeShape, Types
 
 _TIMEOUT = 'timeout: float | None = 5.0'
+_NO_PARAMETER = 'the node declares no such parameter, or one of another type'
 # What a mapping has of its own: `node.parameters.keys` is no parameter.
 _OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
 # The types of Python that parameters have.
@@ -28,16 +32,19 @@ _SETTINGS = (
 )
 
 
-def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
+def write_nodes(
+    module: str, classes: Mapping[str, NodeShape], nodes: Iterable[NodeSpec]
+) -> Iterator[str]:
     """Yield the lines of a stub with nodes.
 
     Args:
         module: Its dotted name.
         classes: The shape of each node, by the name of its class; equal shapes are one class.
+        nodes: Those whose parameters behaviours may set and get.
     """
     imports = StubImports(module)
     first: dict[NodeShape, str] = {}
-    lines: list[str] = []
+    lines = [*_write_base(imports, nodes)]
     for name, shape in classes.items():
         if shape in first:
             lines += ['', f'{name} = {first[shape]}']
@@ -47,6 +54,86 @@ def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
     yield from _SETTINGS
     yield from imports.lines()
     yield from lines
+
+
+def _write_base(imports: StubImports, nodes: Iterable[NodeSpec]) -> Iterator[str]:
+    """Yield the class that the nodes of a system have in common: it knows their parameters."""
+    known = _names_by_parameters([*nodes])
+    anything, mapping = imports.take('typing', 'Any'), imports.take('typing', 'Mapping')
+    of_dict, names_of = imports.take('typing', 'TypedDict'), imports.take('typing', 'Iterable')
+    getters, setters = [], []
+    for number, (types, names) in enumerate(known.items()):
+        fields = {name: _named(imports, ' | '.join(each)) for name, each in types}
+        entries = ', '.join(f'{name!r}: {of_type}' for name, of_type in fields.items())
+        yield from ('', f'_Values{number} = {of_dict}(')
+        yield f"    '_Values{number}', {{{entries}}}, total=False"
+        yield ')'
+        node_name = f'self, node_name: {_literal(imports, names)}'
+        getters.append(
+            f'    def get_parameters({node_name}, names: {names_of}[{_literal(imports, fields)}], '
+            f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
+        )
+        setters.append(
+            f'    def set_parameters({node_name}, values: _Values{number}, '
+            f'{_TIMEOUT}) -> None: ...'
+        )
+    if known:
+        # Composer raises an error then. Names of other nodes, and computed ones, are not known.
+        literal = imports.take('typing', 'LiteralString')
+        decorator = f'    @{imports.take("typing_extensions", "deprecated")}({_NO_PARAMETER!r})\n'
+        node_name = f'self, node_name: {_literal(imports, chain(*known.values()))}'
+        getters.append(
+            f'{decorator}    def get_parameters({node_name}, names: {names_of}[{literal}], '
+            f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
+        )
+        setters.append(
+            f'{decorator}    def set_parameters({node_name}, values: {mapping}[{literal}, '
+            f'{anything}], {_TIMEOUT}) -> None: ...'
+        )
+    getters.append(
+        f'    def get_parameters(self, node_name: str, names: {names_of}[str], {_TIMEOUT}) -> '
+        f'dict[str, {anything}]: ...'
+    )
+    setters.append(
+        f'    def set_parameters(self, node_name: str, values: {mapping}[str, {anything}], '
+        f'{_TIMEOUT}) -> None: ...'
+    )
+    yield from ('', f'class _SystemNode({imports.take("composer", "Node")}):')
+    yield from _overloaded(imports, getters)
+    yield from _overloaded(imports, setters)
+
+
+def _names_by_parameters(nodes: Sequence[NodeSpec]) -> dict[Types, list[str]]:
+    """Return the names of nodes by the parameters that they declare."""
+    known: dict[Types, list[str]] = {}
+    is_flat = all(node.full_name.count('/') == 1 for node in nodes)
+    for node in nodes:
+        if not node.allow_undeclared_parameters:
+            # In a namespace, a name without a slash may mean another node.
+            names = [node.full_name, *([node.full_name[1:]] if is_flat else [])]
+            known.setdefault(parameter_types(node), []).extend(names)
+    return known
+
+
+def _overloaded(imports: StubImports, methods: Iterable[str]) -> list[str]:
+    several = list(methods)
+    if len(several) <= 1:
+        return several
+    decorator = f'    @{imports.take("typing", "overload")}'
+    return [line for method in several for line in (decorator, method)]
+
+
+def _literal(imports: StubImports, names: Iterable[str]) -> str:
+    return f'{imports.take("typing", "Literal")}[{", ".join(map(repr, names))}]'
+
+
+def _named(imports: StubImports, of_type: str) -> str:
+    """Return a type with the names by which a stub knows those of `typing`."""
+    for name in ('Any', 'Literal', 'Time'):
+        if of_type.startswith(name):
+            alias = imports.take('rclpy.time' if name == 'Time' else 'typing', name)
+            return alias + of_type.removeprefix(name)
+    return of_type
 
 
 @record
@@ -59,19 +146,21 @@ class _Writer:
     def node(self, shape: NodeShape) -> Iterator[str]:
         yield from self._parameters(shape)
         yield from self._state(shape)
-        yield from ('', f'class {self.name}({self.imports.take("composer", "Node")}):')
-        yield from self._property('parameters', f'{self.name}Parameters')
+        yield from ('', f'class {self.name}(_SystemNode):')
+        # Type checkers narrow what is final, as by `is not None`, and no property.
+        yield f'    parameters: {self.imports.take("typing", "Final")}[{self.name}Parameters]'
         yield from self._property('state', f'{self.name}State')
         yield from self._property('logger', self.imports.support('Logger'))
-        yield from self._overloaded(
-            self._publish(name, types) for name, types in shape.publishers
+        yield from _overloaded(
+            self.imports, (self._publish(name, types) for name, types in shape.publishers)
         ) or [self._method('publish', 'Never', 'Never', '', 'None')]
         for method in ('call', 'call_async'):
-            yield from self._overloaded(
-                self._call(method, name, types) for name, types in shape.service_clients
+            yield from _overloaded(
+                self.imports,
+                (self._call(method, name, types) for name, types in shape.service_clients),
             ) or [self._method(method, 'Never', 'Never', f', {_TIMEOUT}', 'None')]
-        yield from self._overloaded(
-            self._send_goal(name, types) for name, types in shape.action_clients
+        yield from _overloaded(
+            self.imports, (self._send_goal(name, types) for name, types in shape.action_clients)
         ) or [self._method('send_goal', 'Never', 'Never', f', {_TIMEOUT}', 'None')]
 
     def _property(self, name: str, of_type: str) -> Iterator[str]:
@@ -82,18 +171,25 @@ class _Writer:
         anything = self.imports.take('typing', 'Any')
         mapping = self.imports.take('typing', 'Mapping')
         yield from ('', f'class {self.name}Parameters({mapping}[str, {anything}]):')
-        types = {name: ' | '.join(map(self._value, each)) for name, each in shape.parameters}
+        final = self.imports.take('typing', 'Final')
+        types = {name: self._union(each) for name, each in shape.parameters}
         # A parameter may have the name of a type, which means the parameter in the class.
         for hidden in _OF_PYTHON & types.keys():
             alias = self.imports.take('builtins', hidden)
-            types = {name: re.sub(rf'\b{hidden}\b', alias, each) for name, each in types.items()}
+            types = {
+                name: each if "'" in each else re.sub(rf'\b{hidden}\b', alias, each)
+                for name, each in types.items()
+            }
         for name, of_type in types.items():
             if is_writable(name) and name not in _OF_MAPPINGS and not name.startswith('__'):
-                yield from self._property(name, of_type)
+                yield f'    {name}: {final}[{of_type}]'
         yield f'    def __call__(self, prefix: str) -> dict[str, {anything}]: ...'
-        yield from self._overloaded(
-            f'    def __getitem__(self, name: {self._literal(name)}, /) -> {of_type}: ...'
-            for name, of_type in types.items()
+        yield from _overloaded(
+            self.imports,
+            (
+                f'    def __getitem__(self, name: {self._literal(name)}, /) -> {of_type}: ...'
+                for name, of_type in types.items()
+            ),
         )
 
     def _state(self, shape: NodeShape) -> Iterator[str]:
@@ -106,7 +202,14 @@ class _Writer:
         if shape.state is None:
             yield f'    def __getattr__(self, name: str) -> {anything}: ...'
         # Last, as a name may be that of a type.
-        yield from (f'    {each}: {anything}' for each in shape.state or () if is_writable(each))
+        for name, types in shape.state or ():
+            if is_writable(name):
+                of_type = anything if name in _OF_PYTHON else self._union(types)
+                yield f'    {name}: {of_type}'
+
+    def _union(self, types: Iterable[str]) -> str:
+        several = [_named(self.imports, each) for each in types]
+        return self.imports.take('typing', 'Any') if 'Any' in types else ' | '.join(several)
 
     def _publish(self, name: str, types: Sequence[str]) -> str:
         return self._method('publish', self._literal(name), self._payloads(types), '', 'None')
@@ -138,13 +241,6 @@ class _Writer:
             f'    {word} {method}(self, name: {name}, payload: {payload}{rest}) -> {answer}: ...'
         )
 
-    def _overloaded(self, methods: Iterable[str]) -> list[str]:
-        several = list(methods)
-        if len(several) <= 1:
-            return several
-        decorator = f'    @{self.imports.take("typing", "overload")}'
-        return [line for method in several for line in (decorator, method)]
-
     def _payloads(self, types: Sequence[str], part: str = '') -> str:
         if '' in types:
             return self.imports.take('typing', 'Any')
@@ -153,7 +249,4 @@ class _Writer:
     def _literal(self, name: str) -> str:
         if not name:
             return 'str'
-        return f'{self.imports.take("typing", "Literal")}[{name!r}]'
-
-    def _value(self, of_type: str) -> str:
-        return self.imports.take('typing', 'Any') if of_type == 'Any' else of_type
+        return _literal(self.imports, [name])

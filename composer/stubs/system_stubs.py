@@ -33,7 +33,9 @@ def stubs_of(context: CheckContext) -> dict[str, str]:
     classes = name_classes(shapes_of(context, modules))
     files = dict(write_messages(context, modules))
     # No `.pyi`: pyright warns of a stub without a module, and here there is none.
-    files[f'{SUPPORT}/{module}.py'] = text_of(write_nodes(f'{SUPPORT}.{module}', classes))
+    files[f'{SUPPORT}/{module}.py'] = text_of(
+        write_nodes(f'{SUPPORT}.{module}', classes, all_nodes(context))
+    )
     return files
 
 
@@ -59,6 +61,22 @@ def write_messages(
 def read_template(name: str) -> str:
     """Return the text of a stub that is the same for all systems."""
     return (resources.files('composer') / 'stubs' / 'shared' / name).read_text(encoding='utf-8')
+
+
+def stand_ins(qos_profiles: Iterable[str] = ()) -> dict[str, str]:
+    """Return the stubs of what behaviours use of Composer and rclpy, in place of the packages.
+
+    Args:
+        qos_profiles: The names of those that the system declares.
+    """
+    names = ''.join(f'{name!r}, ' for name in qos_profiles)
+    composer = read_template('composer.pyi').replace('Literal[', f'Literal[{names}', 1)
+    return {
+        'composer/__init__.pyi': composer,
+        'rclpy/__init__.pyi': 'from typing import Any\ndef __getattr__(name: str) -> Any: ...\n',
+        'rclpy/time.pyi': read_template('rclpy_time.pyi'),
+        'rclpy/duration.pyi': read_template('rclpy_duration.pyi'),
+    }
 
 
 def text_of(lines: Iterable[str]) -> str:

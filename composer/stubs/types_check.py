@@ -19,14 +19,14 @@ from composer.stubs.annotated_copies import AnnotatedCopy, Annotator
 from composer.stubs.field_types import SUPPORT
 from composer.stubs.node_shapes import NodeShape, merge_shapes
 from composer.stubs.node_stubs import write_nodes
-from composer.stubs.project_modules import find_project_modules
+from composer.stubs.project_modules import all_nodes, find_project_modules
 from composer.stubs.received_values import find_received_values
 from composer.stubs.relevant_reports import RelevantReports
 from composer.stubs.system_stubs import (
     class_name,
     module_of,
-    read_template,
     shapes_of,
+    stand_ins,
     text_of,
     write_messages,
 )
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.language.specs import NodeSpec
     from composer.stubs.project_modules import ProjectModule
     from composer.stubs.type_checkers import TypeReport
 
@@ -63,12 +64,12 @@ class TypesCheck:
             return
         with _temporary_folder() as folder:
             stubs, copies = folder / 'stubs', folder / 'modules'
-            classes = _Classes(module_of(context), shapes_of(context, modules))
+            classes = _Classes(module_of(context), shapes_of(context, modules), all_nodes(context))
             annotator = Annotator(find_received_values(context, modules), classes.of)
             written = {path: annotator.copy(module) for path, module in _by_path(modules)}
             files = dict(write_messages(context, modules))
             files |= classes.files()
-            files['composer/__init__.pyi'] = read_template('composer.pyi')
+            files |= stand_ins(context.spec.qos)
             _write(stubs, files)
             _write(copies, {path: copy.text for path, copy in written.items()})
             reports = run_type_checker(
@@ -98,6 +99,7 @@ class _Classes:
 
     module: str
     shapes: dict[str, NodeShape]
+    nodes: list[NodeSpec]
     _names: dict[NodeShape, str] | None = None
 
     def of(self, keys: Iterable[str]) -> tuple[str, str]:
@@ -115,7 +117,7 @@ class _Classes:
     def files(self) -> dict[str, str]:
         """Return the stub with the classes that were asked for, by its path."""
         classes = {name: shape for shape, name in (self._names or {}).items()}
-        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes))
+        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes, self.nodes))
         return {f'{SUPPORT}/{self.module}.pyi': text}
 
 

@@ -11,7 +11,7 @@ from composer.checks.checker import create_context
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.stubs import type_checkers
-from composer.stubs.system_stubs import read_template, stubs_of
+from composer.stubs.system_stubs import stand_ins, stubs_of
 from composer.stubs.types_check import TypesCheck
 
 pytestmark = pytest.mark.ros
@@ -177,7 +177,7 @@ def test_check_types_refuses_what_does_not_fit_and_nothing_else(tmp_path, monkey
 def test_the_stubs_refuse_what_does_not_fit_and_nothing_else(tmp_path, monkeypatch, checker):
     wrong = write_probes(tmp_path, annotated=True)
     monkeypatch.chdir(tmp_path)
-    files = stubs_of(load(tmp_path)) | {'composer/__init__.pyi': read_template('composer.pyi')}
+    files = stubs_of(load(tmp_path)) | stand_ins()
     for name, text in files.items():
         (tmp_path / 'typings' / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / 'typings' / name).write_text(text)

@@ -1,30 +1,35 @@
 """What behaviours use of Composer; in place of the package itself when behaviours are checked."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, Literal, Protocol, TypeAlias
 
-from builtin_interfaces.msg import Time as _TimeMessage
 from composer_stubs import Logger
+from rclpy.time import Time
 
-class Time:
-    """A time of a node's clock, as rclpy has it."""
-
-    clock_type: Any
+class _QosProfile(Protocol):
     @property
-    def nanoseconds(self) -> int: ...
-    def seconds_nanoseconds(self) -> tuple[int, int]: ...
-    def to_msg(self) -> _TimeMessage: ...
-    def __add__(self, other: Any) -> Any: ...
-    def __radd__(self, other: Any) -> Any: ...
-    def __sub__(self, other: Any) -> Any: ...
-    def __lt__(self, other: Any) -> bool: ...
-    def __le__(self, other: Any) -> bool: ...
-    def __gt__(self, other: Any) -> bool: ...
-    def __ge__(self, other: Any) -> bool: ...
+    def reliability(self) -> Any: ...
+
+_Qos: TypeAlias = (
+    Literal[
+        'default',
+        'sensor_data',
+        'services_default',
+        'parameters',
+        'parameter_events',
+        'action_status_default',
+        'system_default',
+        'best_available',
+    ]
+    | int
+    | Mapping[str, Any]
+    | _QosProfile
+    | None
+)
 
 class Node:
     name: str
-    own_state: dict[str, Any]
+    own_state: dict[Any, Any]
     ros: Any
     @property
     def parameters(self) -> Any: ...
@@ -46,14 +51,14 @@ class Node:
         self, node_name: str, names: Iterable[str], timeout: float | None = 5.0
     ) -> dict[str, Any]: ...
     def create_publisher(
-        self, msg_type: Any, topic: str, qos: Any = None, **options: Any
+        self, msg_type: Any, topic: str, qos: _Qos = None, **options: Any
     ) -> Any: ...
     def create_subscription(
         self,
         msg_type: Any,
         topic: str,
         behaviour: Callable[..., Any],
-        qos: Any = None,
+        qos: _Qos = None,
         **options: Any,
     ) -> Any: ...
     def create_timer(

@@ -27,7 +27,7 @@ def tick(node):
 def obey(node, message):
     node.logger.warnning('moving')  # error
     speed = message.linear.x + message.linaer.x  # error
-    message.angular.z = 1
+    message.angular.z = 1  # error
     message.angular.z = 'fast'  # error
     return f'{speed}'
 
