@@ -69,6 +69,12 @@ clean:
 	rm -rf .venv .venv-* build dist .mypy_cache .pytest_cache .ruff_cache
 
 $(VENV)/ready: pyproject.toml Makefile $(CONSTRAINTS)
+	@case '$(ROS_DISTRO)' in foxy|galactic|humble|iron) \
+	  echo 'error: ROS 2 $(ROS_DISTRO) is sourced, which is too old: use Jazzy or later' >&2; exit 1;; esac
+	@test -n '$(ROS_DISTRO)' || test "$$(uname -m)" = x86_64 || { \
+	  echo "error: there are no wheels of ROS 2 for $$(uname -m)" >&2; \
+	  echo 'help: source a ROS 2 first (. /opt/ros/jazzy/setup.sh), or use conda or a container: docs/workspaces.md' >&2; \
+	  exit 1; }
 	@echo 'setting up $(VENV), which takes about a minute'
 	@# One whose set-up was interrupted may have halves of packages.
 	@test -e $@ || rm -rf $(VENV)

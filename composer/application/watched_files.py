@@ -221,4 +221,6 @@ def _stamps_of(paths: Iterable[Path], *, only_inode: bool = False) -> dict[Path,
 
 def _reason_of(error: Exception) -> str:
     """Return why the kernel cannot report changes, in one line and without paths."""
+    if isinstance(error, ImportError):
+        return 'watchfiles is not installed (pip install watchfiles)'
     return str(error).partition(' about [')[0].partition('\n')[0].rstrip('.')

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from click.shell_completion import CompletionItem
+
 _Command = TypeVar('_Command', bound='Callable[..., Any]')
 
 # Negative numbers are values; `split_words` refuses everything else that starts with a dash.
@@ -25,8 +27,23 @@ _OPTION = re.compile(r'-[^\W\d]|--')
 def takes_system(command: _Command) -> _Command:
     """Add the file, layers and arguments (`words`) and `--set` (`set_values`) to a command."""
     metavar = 'FILE [LAYER]... [NAME:=VALUE]...'
-    words = click.argument('words', nargs=-1, type=click.UNPROCESSED, metavar=metavar)
+    words = click.argument(
+        'words',
+        nargs=-1,
+        type=click.UNPROCESSED,
+        metavar=metavar,
+        shell_complete=complete_words,
+    )
     return words(takes_settings(command))
+
+
+def complete_words(
+    _context: click.Context, _argument: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Return what the shell completes a word to: files."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(incomplete, type='file')]
 
 
 def takes_settings(command: _Command) -> _Command:
