@@ -36,6 +36,14 @@ if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
+def pytest_collection_modifyitems(items):
+    if not os.environ.get('LONG'):
+        skip = pytest.mark.skip(reason='takes long: LONG=1 runs it')
+        for item in items:
+            if item.get_closest_marker('long'):
+                item.add_marker(skip)
+
+
 @pytest.fixture(autouse=True)
 def process_of_no_system():
     """Fail a test that runs, in this process, a system that ends the process seconds later."""

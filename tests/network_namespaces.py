@@ -45,10 +45,6 @@ needs_namespaces = pytest.mark.skipif(
     not _may_create(), reason='needs the right to create network namespaces'
 )
 
-takes_long = pytest.mark.skipif(
-    not os.environ.get('LONG'), reason='takes longer than a minute: LONG=1 runs it'
-)
-
 
 class _Namespaces:
     """Namespaces that exist while a process of theirs sleeps.

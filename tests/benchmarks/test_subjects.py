@@ -45,6 +45,7 @@ def sides():
     return wanted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('subject', 'side', 'keys'), [(*job, keys) for job, keys in sides().items()]
 )

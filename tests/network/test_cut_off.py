@@ -3,7 +3,7 @@
 import pytest
 
 from tests.network.test_discovery_kinds import CODE, SYSTEM
-from tests.network_namespaces import needs_namespaces, takes_long
+from tests.network_namespaces import needs_namespaces
 
 # With these, Fast DDS takes a participant for gone after 4 s instead of 20.
 SHORT_LEASE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -43,7 +43,7 @@ def test_a_host_that_was_gone_is_found_again(create_hosts, tmp_path):
     check_return(hosts, ('cut', 'mend'), FASTRTPS_DEFAULT_PROFILES_FILE=str(profiles))
 
 
-@takes_long
+@pytest.mark.long
 @pytest.mark.parametrize('how', [('cut', 'mend'), ('take_down', 'bring_up')])
 @pytest.mark.parametrize(
     'network',

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.network_namespaces import needs_namespaces, takes_long
+from tests.network_namespaces import needs_namespaces
 
 SYSTEM = """
     version: 1
@@ -67,7 +67,7 @@ def test_hosts_that_may_not_multicast_find_nobody(create_hosts):
     base.wait_for("waited 4 s for the node '/camera': there is no such node")
 
 
-@takes_long
+@pytest.mark.long
 def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
     """Who is there already, and who comes then, find each other by it."""
     hosts = create_hosts('base', 'jetson')
@@ -83,7 +83,7 @@ def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
     base.wait_for('saw', times=heard + 3)
 
 
-@takes_long
+@pytest.mark.long
 @pytest.mark.parametrize('kind', ['peers', 'discovery_server'])
 def test_five_hosts_hear_all_others(create_hosts, kind):
     names = ['base', 'jetson', 'arm', 'front', 'rear']
