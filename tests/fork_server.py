@@ -1,13 +1,13 @@
 """Starts `python -m composer` by a fork of a process that has imported what each start imports.
 
 Imports are half of the work of a start, and tests start Composer hundreds of times. What is forked
-has imported nothing of ROS, which reads its environment when it is imported, and nothing of
-Composer that minds forks: that is left to the child. All else is as in a new process: the command
+has imported rclpy, which starts no thread by that, but only for a child with the variables of ROS
+that the tests have; and nothing of Composer that minds forks: that is left to the child. All else is as in a new process: the command
 line, the folder, the environment, the descriptors, the ignored signals, and how it exits.
 """
 
 import gc
-import importlib
+import importlib.util
 import inspect
 import json
 import os
@@ -24,6 +24,10 @@ from functools import cache
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 # Variables that Python and libraries read once, when they start.
 _READ_ONCE = ('PYTHON', 'LANG', 'LC_', 'LD_', 'OMP_', 'OPENBLAS_', 'NPY_')
+# ROS may read one of these when it is imported; the others are read when a context begins.
+_OF_ROS = ('ROS', 'RMW_', 'RCUTILS_', 'RCL', 'AMENT_', 'FASTRTPS_', 'FASTDDS_')
+_READ_LATER = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_HOME')
+_IMPORTED_OF_ROS = ('rclpy', 'rclpy.action', 'rclpy.executors', 'rclpy.parameter_client')
 # What these import in turn is none of ROS.
 _IMPORTED = (
     'composer.checks.checker',
@@ -39,24 +43,33 @@ _MAX_BYTES = 1 << 17
 def start_composer(arguments, folder, environment):
     """Start Composer in a new process, with its output in one pipe."""
     read_once = {name: value for name, value in environment.items() if name.startswith(_READ_ONCE)}
-    server = _server(frozenset(read_once.items()))
+    has_ros = _variables_of_ros(environment) == _variables_of_ros(os.environ)
+    server = _server(frozenset(read_once.items()), has_ros)
     return ForkedProcess(server, list(arguments), folder, environment)
 
 
+def _variables_of_ros(environment):
+    return {
+        name: value
+        for name, value in environment.items()
+        if name.startswith(_OF_ROS) and name not in _READ_LATER
+    }
+
+
 @cache
-def _server(read_once):
-    return _Server(dict(read_once))
+def _server(read_once, has_ros):
+    return _Server(dict(read_once), has_ros)
 
 
 class _Server:
     """The process that forks, which ends with this one."""
 
-    def __init__(self, read_once):
+    def __init__(self, read_once, has_ros):
         rest = {each: of for each, of in os.environ.items() if not each.startswith(_READ_ONCE)}
         self._socket, its_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with its_end:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', __name__, str(its_end.fileno())],
+                [sys.executable, '-m', __name__, str(its_end.fileno()), 'ros' * has_ros],
                 cwd=_FOLDER,
                 env=rest | read_once,
                 # As those of a child, which takes its streams over.
@@ -182,7 +195,8 @@ def _become(request, output):
 
 
 if __name__ == '__main__':
-    for name in _IMPORTED:
+    of_ros = _IMPORTED_OF_ROS if sys.argv.pop() and importlib.util.find_spec('rclpy') else ()
+    for name in (*_IMPORTED, *of_ros):
         importlib.import_module(name)
     _warm_up()
     _become(*_serve(int(sys.argv[1])))
