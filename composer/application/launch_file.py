@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, SourceFile, Span
 from composer.errors import UsageError
-from composer.input_limits import read_file
+from composer.input_limits import UnreadableFileError, read_file
 from composer.language.pipeline import load_system
 from composer.launch_files.results import LaunchError
 from composer.yaml_text.document import Document
@@ -42,7 +42,10 @@ def is_launch_file(path: Path) -> bool:
         return False
     if path.suffix in LAUNCH_SUFFIXES:
         return True
-    text = read_file(path)
+    try:
+        text = read_file(path)
+    except UnreadableFileError:
+        return False  # reading it as a system will report the error
     if is_launch_code(text.decode(errors='replace')):
         return True
     # Only such a file is read twice.

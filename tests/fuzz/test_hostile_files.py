@@ -48,7 +48,13 @@ def _run_in_child(folder, output, words, more):
     os._exit(code)
 
 
-@pytest.mark.parametrize('name', CASES)
+# What is followed for as long as the limits of inference allow.
+SLOW = ('chain_of_attributes', 'functions_that_call_each_other', 'many_modules')
+
+
+@pytest.mark.parametrize(
+    'name', [pytest.param(each, marks=[pytest.mark.long] * (each in SLOW)) for each in CASES]
+)
 def test_hostile_files_end_in_findings(name, tmp_path):
     write_files, rules = CASES[name]
     write_files(tmp_path)

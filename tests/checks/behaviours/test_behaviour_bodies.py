@@ -476,6 +476,7 @@ def check_line(check, line):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize(('line', 'rule'), WRONG.items(), ids=WRONG)
 def test_what_is_wrong_is_found_in_its_line(check, line, rule):
     number, found = check_line(check, line)
@@ -513,6 +514,7 @@ def test_a_field_is_found_where_it_is_written(check, lines, mark):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize('line', RIGHT)
 def test_what_may_be_right_has_no_finding(check, line):
     _, found = check_line(check, line)
@@ -520,6 +522,7 @@ def test_what_may_be_right_has_no_finding(check, line):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     'folder', sorted(IDIOMS.glob('*/system.yaml')), ids=lambda p: p.parent.name
 )

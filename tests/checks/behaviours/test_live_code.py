@@ -299,12 +299,14 @@ ROWS = {
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize(('system', 'text'), ROWS.values(), ids=ROWS)
 def test_what_is_reached_is_used(check, system, text):
     assert check(system, HEAD + text.replace('GO', GO)) == []
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize(('system', 'text'), ROWS.values(), ids=ROWS)
 def test_an_error_in_what_is_reached_is_found(check, system, text):
     code = HEAD + text.replace('GO', GO.replace('level', 'levle'))

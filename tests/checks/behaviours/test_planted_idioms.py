@@ -1780,6 +1780,7 @@ def fill(text, group):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize('text', PLANTED.values(), ids=PLANTED)
 def test_an_error_is_found_in_its_line(check, text):
     lines = [number for number, line in enumerate(text.splitlines(), 1) if PLACE.search(line)]
@@ -1787,6 +1788,7 @@ def test_an_error_is_found_in_its_line(check, text):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize('text', PLANTED.values(), ids=PLANTED)
 def test_an_idiom_without_an_error_has_no_finding(check, text):
     assert check(SYSTEM, fill(text, 2)) == []

@@ -201,6 +201,7 @@ def _find(check, case, *, read_only=True):
     return [rule for _, rule in check(nodes, code) if rule != 'missing-module']
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize('case', WRITES)
 def test_writes_to_the_message_are_found(check, case):
     assert set(_find(check, case)) == {'read-only-message'}

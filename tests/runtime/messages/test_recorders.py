@@ -17,9 +17,10 @@ from tests.runtime.messages.recorders import playing
 pytestmark = pytest.mark.ros
 
 
-def test_recorders_that_come_and_go_disturb_nobody(tmp_path, domain_id):
-    with playing(tmp_path, 1, domain_id) as game:
-        for _ in range(15):
+@pytest.mark.parametrize(('seed', 'turns'), [(1, 5), pytest.param(2, 30, marks=pytest.mark.long)])
+def test_recorders_that_come_and_go_disturb_nobody(tmp_path, domain_id, seed, turns):
+    with playing(tmp_path, seed, domain_id) as game:
+        for _ in range(turns):
             game.play()
         game.kill()
         game.play()

@@ -326,7 +326,7 @@ _OF_COMPONENTS = (
 )
 _OF_DECLARED_NODES = (
     *('publishers', 'subscriptions', 'services', 'service_clients', 'actions', 'action_clients'),
-    *('interface', 'allow_undeclared_parameters'),
+    'interface',
 )
 _DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
@@ -352,7 +352,10 @@ LEFT_OUT: dict[str, str] = {
     **{f'container.{key}': _APART for key in _OF_CONTAINERS},
     **{f'component.{key}': _APART for key in (*_OF_COMPONENTS, *_OF_DECLARED_NODES)},
     **{f'process.{key}': _DECLARED for key in (*_OF_DECLARED_NODES, 'nodes')},
-    **{f'declared_node.{key}': _DECLARED for key in (*_OF_DECLARED_NODES, 'parameters')},
+    **{
+        f'declared_node.{key}': _DECLARED
+        for key in (*_OF_DECLARED_NODES, 'parameters', 'allow_undeclared_parameters')
+    },
     **{f'declared_topic.{key}': _DECLARED for key in ('type', 'topic', 'qos', 'external')},
     **{f'declared_service.{key}': _DECLARED for key in ('type', 'service', 'qos', 'external')},
     **{f'declared_action.{key}': _DECLARED for key in ('type', 'action', 'external')},

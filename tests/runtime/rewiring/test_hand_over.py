@@ -30,20 +30,26 @@ EDITS = {
     'options': {'with': {'word': 'other'}},
     'two at once': {'qos': {**DEEP, 'depth': MANY + 1}, 'group': 'own', 'read_only': True},
 }
-WAYS = ('handed over', 'sent', 'heard outside', 'sent first')
+_long = pytest.mark.long
+WAYS = (
+    'handed over',
+    'sent first',
+    pytest.param('sent', marks=_long),
+    pytest.param('heard outside', marks=_long),
+)
 # Each edit; each way with three of them, and with both states of the subscription.
 HAND_OVERS = [
     ('deeper', 'handed over', 'in a callback'),
-    ('deeper', 'sent first', 'free'),
-    ('best effort', 'handed over', 'free'),
+    pytest.param('deeper', 'sent first', 'free', marks=_long),
+    pytest.param('best effort', 'handed over', 'free', marks=_long),
     ('best effort', 'sent', 'in a callback'),
     ('always sent', 'heard outside', 'free'),
-    ('always sent', 'handed over', 'in a callback'),
+    pytest.param('always sent', 'handed over', 'in a callback', marks=_long),
     ('group', 'sent first', 'in a callback'),
-    ('reentrant', 'sent', 'free'),
+    pytest.param('reentrant', 'sent', 'free', marks=_long),
     ('reentrant', 'heard outside', 'in a callback'),
-    ('options', 'heard outside', 'free'),
-    ('two at once', 'sent', 'free'),
+    pytest.param('options', 'heard outside', 'free', marks=_long),
+    pytest.param('two at once', 'sent', 'free', marks=_long),
     ('two at once', 'sent first', 'in a callback'),
 ]
 
