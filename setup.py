@@ -4,13 +4,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from setuptools import Distribution, find_namespace_packages, setup
+from setuptools import Distribution, setup
 
 SHARE = 'share/rclpy_composer'
-OWN = ('composer', 'composer.*', 'behaviours')
 # With `--symlink-install`, this file is a link.
 SOURCE = Path(__file__).resolve().with_name('pyproject.toml')
 PROJECT = tomllib.loads(SOURCE.read_text(encoding='utf-8'))['project']
+# Where colcon links the sources, the schemas are beside them.
+SCHEMAS = ['composer.schemas'] if Path('schemas').is_dir() else []
 SCRIPTS = {'console_scripts': PROJECT['scripts']}
 
 
@@ -36,14 +37,11 @@ setup(
         group: [f'{name} = {place}' for name, place in places.items()]
         for group, places in (SCRIPTS | PROJECT['entry-points']).items()
     },
-    # Folders of data are packages, too: all of their files are installed.
-    packages=[
-        *find_namespace_packages(include=OWN, exclude=['*__pycache__']),
-        # Linked sources have the schemas beside them.
-        *(['composer.schemas'] if Path('schemas').is_dir() else []),
-    ],
+    packages=['behaviours', 'composer', *SCHEMAS],
     package_dir={'composer.schemas': 'schemas'},
-    package_data={'': ['*']},
+    # Some folders of examples have names that no package can have.
+    package_data={'': ['*'], 'composer': ['**/*']},
+    exclude_package_data={'': ['*.pyc']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/rclpy_composer']),
         (SHARE, ['package.xml']),

@@ -64,6 +64,21 @@ def find_share(package: str) -> Path | None:
     return prefix / 'share' / package if prefix else None
 
 
+def find_source(share: Path) -> Path | None:
+    """Return the folder that colcon built a package from and has linked, or `None`.
+
+    With `--symlink-install`, `package.xml` is a link. Where a build without it has left a copy,
+    the egg link of a Python package names its build folder, which has links to the source.
+    """
+    links = [share / 'package.xml']
+    for egg_link in share.parents[1].glob('lib/python*/*-packages/*.egg-link'):
+        if egg_link.stem.replace('-', '_') == share.name:
+            with suppress(OSError, UnicodeDecodeError):
+                build = egg_link.read_text(encoding='utf-8').partition('\n')[0]
+                links.append(Path(build, 'setup.py'))
+    return next((Path(os.path.realpath(link)).parent for link in links if link.is_symlink()), None)
+
+
 def explain_missing_package(package: str, known: Iterable[str], otherwise: str = '') -> str:
     """Return the help for a package that is not installed: the nearest name, or how to get it.
 

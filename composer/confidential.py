@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 PROJECT_MARKS = ('pyproject.toml', '.git')
+# Of a ROS package that is in no project.
+_PACKAGE_MARKS = ('package.xml',)
 _WORD = re.compile(r'\w+')
 # What stands in quotes, with what is left out of it where it is long; or a word.
 _QUOTED_OR_WORD = re.compile(r"'([^']*)'|\w+")
@@ -49,11 +51,15 @@ def begin(files: Iterable[Path]) -> None:
 def list_lineage(folder: Path) -> list[Path]:
     """Return a folder and its parents up to the root of its project.
 
-    That is the nearest one with a `pyproject.toml` or `.git`; if there is none, the folder itself.
+    That is the nearest one with a `pyproject.toml` or `.git`; if there is none, the nearest one
+    with a `package.xml`; else the folder itself.
     """
     lineage = [folder, *folder.parents]
-    roots = [i for i, at in enumerate(lineage) if any((at / m).exists() for m in PROJECT_MARKS)]
-    return lineage[: roots[0] + 1] if roots else [folder]
+    for marks in (PROJECT_MARKS, _PACKAGE_MARKS):
+        for count, at in enumerate(lineage, 1):
+            if any((at / mark).exists() for mark in marks):
+                return lineage[:count]
+    return [folder]
 
 
 @cache

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from composer.language.values.start_reader import StartValueReader
 
 _STANDARD_INPUT = '-'
-_SUFFIXES = ('.yaml', '.yml')
+SUFFIXES = ('.yaml', '.yml')
 _SCHEMA = 'composer.schema.json'
 # Not searched: these hold other people's files. Hidden folders belong to tools.
 _SKIPPED_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
@@ -150,7 +150,7 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     if os.path.isdir(words[0]):
         raise _folder_error(words[0])
     count = 1
-    suffixes = (*_SUFFIXES, *LAUNCH_SUFFIXES) if words[0].endswith(LAUNCH_SUFFIXES) else _SUFFIXES
+    suffixes = (*SUFFIXES, *LAUNCH_SUFFIXES) if words[0].endswith(LAUNCH_SUFFIXES) else SUFFIXES
     while count < len(words) and words[count].endswith(suffixes) and ':=' not in words[count]:
         count += 1
     return [Path(word) for word in words[:count]], list(words[count:])
@@ -230,12 +230,12 @@ def read_standard_input(path: Path, name: str = '<stdin>') -> tuple[Path, bytes 
 
 
 def _is_value(word: str) -> bool:
-    is_file = word == _STANDARD_INPUT or word.endswith(_SUFFIXES) or os.path.lexists(word)
+    is_file = word == _STANDARD_INPUT or word.endswith(SUFFIXES) or os.path.lexists(word)
     return not (is_file or os.sep in word or glob.has_magic(word))
 
 
 def _is_layer(word: str) -> bool:
-    if not word.endswith(_SUFFIXES) or not os.path.isfile(word):
+    if not word.endswith(SUFFIXES) or not os.path.isfile(word):
         return False
     data = read_document(Path(word)).data
     if data is None or _find_near('version', {str(key): 0 for key in data}):
@@ -366,7 +366,7 @@ def walk_yaml_files(folder: Path) -> Iterator[Path]:
         folders[:] = sorted(
             name for name in folders if not name.startswith('.') and name not in _SKIPPED_FOLDERS
         )
-        paths = (Path(at, name) for name in sorted(files) if name.endswith(_SUFFIXES))
+        paths = (Path(at, name) for name in sorted(files) if name.endswith(SUFFIXES))
         # A pipe or a device is nobody's system.
         yield from (path for path in paths if os.path.isfile(path) or not os.path.exists(path))
 

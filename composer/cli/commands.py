@@ -87,14 +87,16 @@ def cli(context: click.Context) -> int:
 
 @cli.command('new')
 @click.argument('name')
-def new_command(name: str) -> int:
+@click.option('--ros-package', 'is_package', is_flag=True, help='Create a ROS package for colcon.')
+def new_command(name: str, *, is_package: bool) -> int:
     """Create a project in a new folder NAME.
 
-    The project has a system, its behaviours, tests, a CI workflow, and the schemas for editors.
+    The project has a system, its behaviours, tests, a CI workflow, and the schemas for editors; a
+    ROS package has message definitions, and tests for 'colcon test', instead of the last two.
     """
     from composer.cli.new import create_project
 
-    return create_project(name)
+    return create_project(name, is_package=is_package)
 
 
 @cli.command('doctor')

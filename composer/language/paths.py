@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from composer.ament import explain_missing_package, find_share, list_packages
+from composer.ament import explain_missing_package, find_share, find_source, list_packages
 from composer.errors import ComposerError
 from composer.input_limits import explain_missing
 from composer.language.values.start_values import replace_start_values
@@ -37,6 +37,8 @@ def is_in_package(text: str) -> bool:
 def resolve_path(text: str, folder: Path) -> Path:
     """Return the path that a text means in a file of `folder`.
 
+    Of a package that colcon has linked, the source counts, also where a file is a copy.
+
     Raises:
         PackagePathError: The package of `package://name/path` is not installed.
     """
@@ -48,7 +50,10 @@ def resolve_path(text: str, folder: Path) -> Path:
         message = f"no package '{package}' is installed"
         help_text = explain_missing_package(package, list_packages())
         raise PackagePathError(message, help=help_text)
-    return share / rest
+    path = share / rest
+    source = None if path.is_symlink() else find_source(share)
+    is_copy = source is not None and os.path.isfile(path) and os.path.isfile(source / rest)
+    return source / rest if source and is_copy else path
 
 
 def explain_absent(path: Path, place: Span, *, is_folder: bool = False) -> str | None:

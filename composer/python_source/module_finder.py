@@ -53,7 +53,7 @@ def project_search_path(configs: Iterable[Path]) -> list[Path]:
     """Return the folders to search for behaviours before the installed packages.
 
     These are the current folder, then the folder of each file and its parents up to the one with a
-    `pyproject.toml` or `.git`; if there is none, only the folder of the file.
+    `pyproject.toml` or `.git`, else `package.xml`; if there is none, only the folder of the file.
     """
     folders = dict.fromkeys(Path(os.path.realpath(config)).parent for config in configs)
     chains = (each for folder in folders for each in list_lineage(folder))

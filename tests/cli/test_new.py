@@ -50,6 +50,41 @@ def texts(project):
     }
 
 
+def test_a_ros_package_is_one_with_a_system_that_has_no_errors(folder, capsys):
+    assert run(['new', '--ros-package', 'my_robot']) == 0
+    assert capsys.readouterr().out.endswith(
+        'run it:\n  colcon build --symlink-install\n  . install/setup.sh\n'
+        '  composer up my_robot my_robot.yaml\n  colcon test\n'
+    )
+    package = folder / 'my_robot'
+    assert set(texts(package)) == {
+        'README.md',
+        'interfaces/my_robot_interfaces/msg/Greeting.msg',
+        'my_robot/__init__.py',
+        'my_robot/behaviours.py',
+        'package.xml',
+        'resource/my_robot',
+        'setup.py',
+        'systems/my_robot.yaml',
+        'test/my_robot.scenario.yaml',
+        'test/test_my_robot.py',
+    }
+    assert not [path for path, text in texts(package).items() if 'my_system' in path + text]
+    assert run(['check', '--strict', str(package)]) == 0
+    # Its behaviours are checked with the system, from wherever that is done.
+    behaviours = package / 'my_robot' / 'behaviours.py'
+    behaviours.write_text(behaviours.read_text().replace('message.text', 'message.txt'))
+    assert run(['check', str(package / 'systems')]) == 1
+    assert 'unknown-field' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('name', ['systems', 'interfaces', 'test', 'resource'])
+def test_no_folder_of_a_ros_package_has_two_meanings(folder, capsys, name):
+    assert run(['new', '--ros-package', name]) == 2
+    assert f"'{name}' cannot name a ROS package" in capsys.readouterr().err
+    assert not list(folder.iterdir())
+
+
 @pytest.mark.ros
 def test_each_command_of_the_readme_works(project, monkeypatch, capsys):
     monkeypatch.chdir(project)

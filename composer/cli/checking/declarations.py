@@ -11,12 +11,13 @@ from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
     check_rule,
     check_rules,
-    refuse_options,
+    read_words,
     split_words,
     takes_format,
     takes_host,
     takes_settings,
     takes_system,
+    takes_words,
 )
 from composer.reports import FORMATS
 
@@ -132,14 +133,11 @@ def check_command(  # noqa: PLR0913 - one for each option
         strict_packages=strict_packages,
         stdin_name=stdin_filename,
     )
-    refuse_options(words)
-    return check(words, options, ReportOptions(format_name, output, expected, quiet))
+    return check(read_words(words), options, ReportOptions(format_name, output, expected, quiet))
 
 
 @click.command('plan', context_settings=NUMBERS_ARE_VALUES)
-@click.argument(
-    'words', nargs=-1, type=click.UNPROCESSED, metavar='[OLD] NEW [NAME:=VALUE]...', required=True
-)
+@takes_words('[OLD] NEW [NAME:=VALUE]...', required=True)
 @click.option(
     '--layer',
     'layers',

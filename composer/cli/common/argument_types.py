@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import os
 import re
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -26,24 +28,35 @@ _OPTION = re.compile(r'-[^\W\d]|--')
 
 def takes_system(command: _Command) -> _Command:
     """Add the file, layers and arguments (`words`) and `--set` (`set_values`) to a command."""
-    metavar = 'FILE [LAYER]... [NAME:=VALUE]...'
-    words = click.argument(
+    metavar = '[PACKAGE] FILE [LAYER]... [NAME:=VALUE]...'
+    return takes_words(metavar)(takes_settings(command))
+
+
+def takes_words(metavar: str, *, required: bool = False) -> Callable[[_Command], _Command]:
+    """Add words to a command, the first of which name files, or files of packages."""
+    return click.argument(
         'words',
         nargs=-1,
         type=click.UNPROCESSED,
         metavar=metavar,
-        shell_complete=complete_words,
+        required=required,
+        shell_complete=_complete_words,
     )
-    return words(takes_settings(command))
 
 
-def complete_words(
-    _context: click.Context, _argument: click.Parameter, incomplete: str
+def _complete_words(
+    context: click.Context, _argument: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    """Return what the shell completes a word to: files."""
+    """Return what the shell completes a word to: files, packages, and systems of these."""
     from click.shell_completion import CompletionItem
 
-    return [CompletionItem(incomplete, type='file')]
+    from composer.application.package_files import complete_file
+
+    names = complete_file(context.params.get('words') or (), incomplete)
+    # The shell would offer the names alone, or files alone.
+    files = glob.glob(f'{glob.escape(incomplete)}*') if names else ()  # noqa: PTH207 - keeps ./
+    offered = [*names, *(f'{file}/' if os.path.isdir(file) else file for file in files)]
+    return [*map(CompletionItem, offered)] or [CompletionItem(incomplete, type='file')]
 
 
 def takes_settings(command: _Command) -> _Command:
@@ -101,12 +114,25 @@ def split_words(words: Sequence[str]) -> tuple[list[Path], list[str]]:
 
     Raises:
         click.UsageError: There is no file, or an unknown option.
-        UsageError: The first word is empty, or a folder.
+        UsageError: The first word is empty, or a folder, or no file of its package.
     """
     from composer.application import file_selection
 
-    refuse_options(words)
-    return file_selection.split_words(words)
+    return file_selection.split_words(read_words(words))
+
+
+def read_words(words: Sequence[str]) -> list[str]:
+    """Return words with paths for the files of packages, if none is meant for an option.
+
+    Raises:
+        click.UsageError: There is none, or an unknown option.
+        UsageError: The first word names a package, and this or its file is not there.
+    """
+    from composer.application.package_files import resolve_words
+
+    resolved = resolve_words(words)
+    refuse_options(resolved)
+    return resolved
 
 
 def refuse_options(words: Sequence[str]) -> None:

@@ -8,6 +8,7 @@ import click
 
 from composer.cli.common.argument_types import (
     NUMBERS_ARE_VALUES,
+    read_words,
     refuse_together,
     split_words,
     takes_format,
@@ -129,7 +130,7 @@ def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: P
     """
     from composer.cli.showing.editors import write_stubs
 
-    return write_stubs(words, set_values, output)
+    return write_stubs(read_words(words), set_values, output)
 
 
 COMMANDS = (show_command, graph_command, schema_command, stubs_command)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN
-from composer.cli.common.argument_types import takes_format
+from composer.cli.common.argument_types import takes_format, takes_words
 
 FORMATS = ('text', 'json', 'github')
 
@@ -15,7 +15,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command('test', epilog=f'Without PATH, the files that match {DEFAULT_PATTERN} are run.')
-@click.argument('words', nargs=-1, metavar='[PATH[::CASE]]...')
+@takes_words('[PATH[::CASE]]...')
 @click.option('-k', 'expression', metavar='EXPR', help='Run the cases whose names match.')
 @click.option('-x', '--exitfirst', 'ends_early', is_flag=True, help='End at the first failure.')
 @click.option(
@@ -79,6 +79,7 @@ def test_command(  # noqa: PLR0913 - one for each option
 
     Exit codes: 0 all passed, 1 something failed, 2 wrong usage, 5 there are no cases.
     """
+    from composer.application.package_files import resolve_words
     from composer.application.test_runs.run_options import RunOptions
     from composer.cli.testing.test import run_tests
 
@@ -96,4 +97,4 @@ def test_command(  # noqa: PLR0913 - one for each option
         is_verbose=is_verbose,
         is_quiet=is_quiet,
     )
-    return run_tests(words, options)
+    return run_tests(resolve_words(words), options)
