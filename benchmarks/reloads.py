@@ -161,8 +161,12 @@ class _Edits:
         )
 
     def _reload(self) -> None:
-        future = self._client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(self._node, future, timeout_sec=_ANSWER_SEC)
+        while True:
+            future = self._client.call_async(Trigger.Request())
+            rclpy.spin_until_future_complete(self._node, future, timeout_sec=_ANSWER_SEC)
+            # The service is there before the system is ready.
+            if not (future.done() and 'still starting' in future.result().message):
+                break
         if not (future.done() and future.result().success):
             message = f'no reload: {future.result() if future.done() else "no answer"}'
             raise RuntimeError(message)

@@ -162,7 +162,7 @@ def test_nodes_stop_once_though_a_signal_and_the_system_end_their_worker(compose
     child.wait_until_ready()
     os.kill(pid_of(child, 'talker'), signal.SIGTERM)
     child.wait_for_line('slow ends in')
-    assert child.stop() == 0
+    assert child.stop() == 0, child.output
     assert len(child.matching('slow ends in')) == len(child.matching('talker ends in')) == 1
 
 
