@@ -46,7 +46,10 @@ class EndedWhileWaitingError(SystemExit):
     """Ends a thread that still waits when a system in virtual time has ended."""
 
     def __str__(self) -> str:
-        return 'it still waited here when the system ended'
+        return (
+            'it still waited here when the system ended: wait with node.sleep, '
+            'or until node.stopping'
+        )
 
 
 class SystemStoppingError(ComposerError):

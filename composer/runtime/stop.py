@@ -47,6 +47,7 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     """
     deadline = monotonic() + timeout_sec
     for node in nodes:
+        node.behaviour_node.stopping.set()
         node.gate.is_open = False
         _cancel_timers(node)
     stops = [_NodeStop(node, timeout_sec) for node in reversed(nodes) if _has_work_left(node)]
@@ -68,8 +69,10 @@ def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) 
         Whether it has stopped. If only `on_stop` has not ended, the gate of the node stays closed;
         if one of its behaviours hangs, nothing has been done to the node.
     """
+    node.behaviour_node.stopping.set()
     node.gate.close()
     if not _wait_for(node.running.wait_until_idle, timeout_sec, gives_up):
+        node.behaviour_node.stopping.clear()
         node.gate.open()
         return False
     _cancel_timers(node)

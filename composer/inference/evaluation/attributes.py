@@ -71,6 +71,7 @@ NODE_METHODS = frozenset(
         'send_goal',
         'set_parameters',
         'shutdown',
+        'sleep',
         'with_own_state',
     }
 )
@@ -81,7 +82,9 @@ _OF_RCLPY = {
     'get_name': 'write node.name',
     'get_parameter': 'write node.parameters.NAME',
 }
-NODE_ATTRIBUTES = frozenset({'logger', 'name', 'own_state', 'parameters', 'ros', 'state'})
+NODE_ATTRIBUTES = frozenset(
+    {'logger', 'name', 'own_state', 'parameters', 'ros', 'state', 'stopping'}
+)
 STORED_IN_NODE = NODE_ATTRIBUTES - {'logger'}
 NAMES_OF_PART: dict[str, frozenset[str]] = {
     'logger': frozenset(
@@ -224,6 +227,8 @@ class Attributes(Part):
             self._evaluator.run.reading.reaches_ros = True
             self._evaluator.run.reading.open_kinds.add('parameter')
             return replace(CHOSEN, is_ros=True)
+        if name == 'stopping':
+            return UNKNOWN
         if name in NODE_ATTRIBUTES:
             return PartOfNode(name)
         if name in NODE_METHODS:

@@ -58,6 +58,9 @@ class NodeCalls(Part):
 
     def call(self, method: str, arguments: Arguments, *, waits: bool, is_awaited: bool) -> Value:
         """Return what a method of the node may return."""
+        if method == 'sleep' and (length := arguments.get(0, 'seconds')):
+            self._evaluator.sleeping.sleep(length, length.place)
+            return UNKNOWN
         if method == 'now':
             return PartOfNode('time')
         if method in ('set_parameters', 'get_parameters'):

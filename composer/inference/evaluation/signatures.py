@@ -31,6 +31,7 @@ _SIGNATURES: dict[tuple[str, str], str] = {
     ('node', 'send_goal'): 'name: str, payload=None, timeout: float | None = 5.0',
     ('node', 'set_parameters'): 'node_name: str, values, timeout: float | None = 5.0',
     ('node', 'shutdown'): 'code: int = 0',
+    ('node', 'sleep'): 'seconds: float',
     ('goal', 'cancel'): 'timeout: float | None = 5.0',
     ('goal', 'result'): 'timeout: float | None = None',
     ('goal', 'result_async'): '',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import threading
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -90,6 +91,13 @@ class Parameters(Mapping[str, Any]):
         return len(list(iter(self)))
 
 
+class Stopping(threading.Event):
+    """True once a node has begun to stop; `wait(seconds)` returns then, with true."""
+
+    def __bool__(self) -> bool:
+        return self.is_set()
+
+
 class Node:
     """A node, as its behaviours see it.
 
@@ -101,6 +109,8 @@ class Node:
         own_state: What the behaviour of one timer, subscription, service or action keeps from
             call to call; empty at the start. Two entities with the same behaviour have one each;
             the goals of an action share theirs.
+        stopping: True once the node has begun to stop, with the system or alone. For loops in
+            behaviours and in threads of their own: `while not node.stopping:`.
         ros: The rclpy node, for everything else.
     """
 
@@ -114,6 +124,7 @@ class Node:
         'parameters',
         'ros',
         'state',
+        'stopping',
     )
 
     def __init__(
@@ -129,6 +140,7 @@ class Node:
         self.ros = ros
         self.state = state
         self.own_state: dict[str, Any] = {}
+        self.stopping = Stopping()
         self.parameters = Parameters(ros)
         self._entities = entities
         self._creation = creation
@@ -149,6 +161,17 @@ class Node:
     def now(self) -> Time:
         """Return the time of the node's clock: simulated if `use_sim_time` is set."""
         return self.ros.get_clock().now()
+
+    def sleep(self, seconds: float) -> bool:
+        """Wait, and no longer than until the node stops; works in threads of behaviours, too.
+
+        Args:
+            seconds: How long: as with `time.sleep`, in virtual time in scenarios.
+
+        Returns:
+            Whether all of the time has passed; false once the node stops.
+        """
+        return not self.stopping.wait(seconds)
 
     def publish(self, name: str, payload: Payload) -> None:
         """Publish on one of the node's declared publishers.

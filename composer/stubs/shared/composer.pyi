@@ -1,6 +1,7 @@
 """What behaviours use of Composer; in place of the package itself when behaviours are checked."""
 
 from collections.abc import Callable, Iterable, Mapping
+from threading import Event
 from typing import Any, Literal, Protocol, TypeAlias
 
 from composer_stubs import Logger
@@ -26,6 +27,9 @@ _Qos: TypeAlias = (
     | _QosProfile
     | None
 )
+
+class Stopping(Event):
+    def __bool__(self) -> bool: ...
 
 class Node:
     name: str
@@ -70,6 +74,9 @@ class Node:
     def create_client(self, srv_type: Any, srv_name: str, **options: Any) -> Any: ...
     def destroy(self, entity: Any) -> None: ...
     def shutdown(self, code: int = 0) -> None: ...
+    @property
+    def stopping(self) -> Stopping: ...
+    def sleep(self, seconds: float) -> bool: ...
 
 class Process:
     name: str
