@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from composer.application.file_selection import walk_yaml_files
 from composer.cli.main import run
 from tests.running import ROOT, wait_for
 
@@ -76,7 +77,7 @@ def test_a_workspace_is_built_sourced_run_and_tested(
     is_linked = '--symlink-install' in options
     module = (workspace / ('build' if is_linked else 'install')).as_posix()
 
-    def composer(*words):
+    def composer(*words, code=0):
         done = subprocess.run(
             ['composer', *words],
             cwd='/',
@@ -85,7 +86,7 @@ def test_a_workspace_is_built_sourced_run_and_tested(
             text=True,
             check=False,
         )
-        assert done.returncode == 0, done.stdout + done.stderr
+        assert done.returncode == code, done.stdout + done.stderr
         return done.stdout
 
     where = [sys.executable, '-c', 'import composer; print(composer.__file__)']
@@ -93,6 +94,9 @@ def test_a_workspace_is_built_sourced_run_and_tested(
     assert composer('--version').startswith('composer, version ')
     assert composer('check', '--strict', 'my_robot').endswith('my_robot.yaml: ok, 2 nodes\n')
     composer('check', '--strict', 'rclpy_composer', 'greeter.yaml')
+    # Of a workspace, what colcon builds and installs is not looked at.
+    assert set(walk_yaml_files(workspace)) == set(walk_yaml_files(workspace / 'src'))
+    behaviours = workspace / 'src/my_robot/my_robot/behaviours.py'
     log = workspace / 'up.log'
     with log.open('w') as stream:
         words = ['composer', 'up', 'my_robot', 'my_robot.yaml', '--watch']
@@ -100,7 +104,6 @@ def test_a_workspace_is_built_sourced_run_and_tested(
     try:
         wait_for(lambda: 'I heard greeting 1: Hello world!' in log.read_text(), 'a greeting')
         if is_linked:
-            behaviours = workspace / 'src/my_robot/my_robot/behaviours.py'
             behaviours.write_text(behaviours.read_text().replace('I heard', 'I saw'))
             wait_for(lambda: 'I saw greeting' in log.read_text(), 'the edited behaviour')
             config = workspace / 'src/my_robot/systems/my_robot.yaml'
@@ -109,6 +112,10 @@ def test_a_workspace_is_built_sourced_run_and_tested(
     finally:
         system.terminate()
         assert system.wait(30) in (0, 143, -15), log.read_text()
+    behaviours = next(workspace.glob('install/my_robot/lib/**/behaviours.py'), behaviours)
+    behaviours.write_text(behaviours.read_text().replace('message.text', 'message.txt'))
+    assert "has no field 'txt'" in composer('check', 'my_robot', code=1)
+    behaviours.write_text(behaviours.read_text().replace('message.txt', 'message.text'))
     if is_linked:
         # What is linked is what the tests run: they fail as the source is now.
         colcon('test', '--packages-select', 'my_robot', *options[1:], code=0)

@@ -35,6 +35,8 @@ SUFFIXES = ('.yaml', '.yml')
 _SCHEMA = 'composer.schema.json'
 # Not searched: these hold other people's files. Hidden folders belong to tools.
 _SKIPPED_FOLDERS = frozenset({'node_modules', '__pycache__', 'site-packages'})
+# Of a workspace, colcon's folders build, install and log have this file.
+_SKIPPED_BY_COLCON = 'COLCON_IGNORE'
 _MAX_BYTES_READ = 1_000_000
 # Of the systems in a folder, the first are listed.
 _MOST_LISTED = 20
@@ -364,7 +366,11 @@ def walk_yaml_files(folder: Path) -> Iterator[Path]:
     """Yield the YAML files in a folder, or in one below it, but not in those of others."""
     for at, folders, files in os.walk(folder):
         folders[:] = sorted(
-            name for name in folders if not name.startswith('.') and name not in _SKIPPED_FOLDERS
+            name
+            for name in folders
+            if not name.startswith('.')
+            and name not in _SKIPPED_FOLDERS
+            and not os.path.exists(Path(at, name, _SKIPPED_BY_COLCON))
         )
         paths = (Path(at, name) for name in sorted(files) if name.endswith(SUFFIXES))
         # A pipe or a device is nobody's system.

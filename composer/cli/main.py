@@ -29,8 +29,8 @@ _MACHINE_ERRORS = {
 }
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run a command line, by default that of this process, and exit with its code."""
+def main() -> None:
+    """Run the command line of this process, and exit with its code."""
     _open_closed_streams()
     for name in ('stdout', 'stderr'):
         stream = getattr(sys, name)
@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors='backslashreplace')
             setattr(sys, name, _without_reader(stream))
-    code = _flush(run(sys.argv[1:] if arguments is None else arguments))
+    code = _flush(run(sys.argv[1:]))
     if 'rclpy' not in sys.modules:
         # Python would look for garbage in all that is left, a tenth of a check's time. Only what
         # ROS made may have to be destroyed.

@@ -7,9 +7,9 @@ It is no base class here: ros2cli calls these methods, and Composer may be insta
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from typing import Any
-
-from composer import signals
 
 
 class ComposerCommand:
@@ -22,12 +22,10 @@ class ComposerCommand:
         words.completer = complete_words
 
     def main(self, *, parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
-        """Run the command line, and end the process with its exit code."""
+        """Become the process of `composer`."""
         del parser
-        signals.end_at_signals()
-        from composer.cli.main import main
-
-        main(args.words)
+        # ros2cli has imported rclpy, which a system does only after it has set its variables.
+        os.execv(sys.executable, [sys.executable, '-P', '-m', 'composer', *args.words])  # noqa: S606 - ourselves
 
 
 def complete_words(prefix: str, parsed_args: argparse.Namespace, **_options: object) -> list[str]:

@@ -177,10 +177,11 @@ class BehaviourReader:
         return found
 
     def _read_anew(self, binding: Binding, facts: NodeFacts, wire: Wire) -> Reading:
-        module = self._finder.find(binding.behaviour.module)
+        name = binding.behaviour.module
+        module = self._finder.find(name)
         if not isinstance(module, ModuleSource):
             return missing_reading()
-        if not is_of_project(module):
+        if not is_of_project(module, name, self._finder):
             return unknown_reading()
         run = Run(facts, self._modules, self._types, self._steps_left)
         evaluator = Evaluator(run)

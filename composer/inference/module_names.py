@@ -208,7 +208,7 @@ class ProjectModules:
     def find(self, name: str) -> ModuleSource | None:
         """Return a module of the project, if it is one and can be read."""
         module = self._finder.find(name)
-        if not isinstance(module, ModuleSource) or not is_of_project(module):
+        if not isinstance(module, ModuleSource) or not is_of_project(module, name, self._finder):
             return None
         self._names.setdefault(id(module), name)
         if id(module) not in self._read:
@@ -313,10 +313,12 @@ class ProjectModules:
         return (self.find(home), name) if home else (None, '')
 
 
-def is_of_project(module: ModuleSource) -> bool:
-    """Return whether a module is neither installed nor of Python itself."""
+def is_of_project(module: ModuleSource, name: str, finder: ModuleFinder) -> bool:
+    """Return whether a module is neither installed, but with the system, nor of Python itself."""
     if module.path is None or not module.body:
         return False
+    if finder.is_of_ros_package(name):
+        return True
     parts = set(module.path.parts)
     return not (parts & _INSTALLED) and not module.path.is_relative_to(sys.base_prefix)
 

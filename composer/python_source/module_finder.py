@@ -138,10 +138,17 @@ class ModuleFinder:
             found = [] if is_built else [*([file] if file else []), *folders[:1]]
             # Python asks no folder for these, whatever is there.
             is_built_in = top in sys.builtin_module_names
-            self._is_own[top] = not is_built_in and any(
-                each.parent in self._project for each in found
-            )
+            is_own = any(each.parent in self._project for each in found)
+            self._is_own[top] = not is_built_in and (is_own or self.is_of_ros_package(top))
         return self._is_own[top]
+
+    def is_of_ros_package(self, name: str) -> bool:
+        """Return whether a module is in the Python package of the ROS package of the files.
+
+        Where that is installed, the files are in its share folder, and the modules are not.
+        """
+        top = name.partition('.')[0]
+        return any(each.name == top and each.parent.name == 'share' for each in self._project)
 
     def _find(self, name: str) -> ModuleSource | MissingModule:
         missing = self.find_missing(name)
