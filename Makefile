@@ -7,7 +7,7 @@ PYTHON ?= python3
 WORKERS ?= 4
 VENV := .venv
 ifdef ROS_DISTRO
-EXTRAS := record,graph,hosts,dev
+EXTRAS := record,types,graph,hosts,dev
 VENV_FLAGS := --system-site-packages
 else ifeq ($(ROS),kilted)
 VENV := .venv-kilted

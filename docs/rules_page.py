@@ -45,8 +45,6 @@ def _family(family: Family) -> Iterator[str]:
 def _remarks(rule: Rule) -> Iterator[str]:
     if rule.needs == 'interfaces':
         yield 'Needs interface packages, which come with ROS 2.'
-    if rule.needs == 'types':
-        yield 'Only `composer check --types` reports it.'
         yield '`# type: ignore` in the line of the module silences it.'
     if rule.ignorable:
         yield f'`# composer: ignore[{rule.name}]` in the line silences it.'

@@ -21,6 +21,8 @@ from composer.language.pipeline import load_combinations, load_system
 from composer.records import record
 from composer.reports.report import CheckedFile, Report, name_combinations
 from composer.scenarios.recognition import SUFFIXES
+from composer.stubs.checking.kept_types import TypesCheck
+from composer.stubs.checking.type_checker import find_program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from composer.language.loaded_system import LoadedSystem
     from composer.rules import Need
     from composer.runtime.behaviours.import_check import ImportCheck
-    from composer.stubs.types_check import TypesCheck
 
 
 @record
@@ -43,8 +44,6 @@ class CheckOptions:
         is_strict: Whether warnings count as errors.
         ignored: Rules whose findings are left out.
         imports: Whether to import the behaviours.
-        types: Whether to run a type checker over the behaviours.
-        type_checker: Its name; `None` for one that is installed.
         skip_other_files: Whether to skip named files that do not look like systems.
         strict_packages: Whether packages that are not installed are errors without ROS 2, too.
         stdin_name: The path that findings in standard input are reported under.
@@ -55,8 +54,6 @@ class CheckOptions:
     matrix: Path | None = None
     ignored: tuple[str, ...] = ()
     imports: bool = False
-    types: bool = False
-    type_checker: str | None = None
     skip_other_files: bool = False
     strict_packages: bool = False
     stdin_name: str = '<stdin>'
@@ -71,15 +68,16 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
 
     Raises:
         UsageError: Arguments or `--set` do not fit the file, or are given together with a matrix.
-        ComposerError: There is no type checker.
+        ComposerError: The type checker does not work.
     """
     catalogue = InterfaceCatalogue()
     selection = _select(words, options)
     absent = AbsentPackages(is_strict=options.strict_packages)
     imports = _import_check() if options.imports else None
     further: dict[Need, FurtherCheck] = {'import': imports} if imports else {}
-    if options.types:
-        further['types'] = _types_check(options.type_checker)
+    types = TypesCheck(find_program())
+    if types.program:
+        further['types'] = types
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     scenarios = list(selection.scenarios)
     for selected in selection.systems:
@@ -89,6 +87,8 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
         checked = []
         for given, combination, system in _load(selected, options):
             context = create_context(system, catalogue)
+            if context and not types.program:
+                types(context, [])
             findings = relocate(absent.leave_out(check_in_context(system, context, further)))
             kept = tuple(finding for finding in findings if finding.rule not in options.ignored)
             nodes = len(system.spec.nodes) if system.spec else None
@@ -103,7 +103,8 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
         files += name_combinations(checked)
     files += [_check_scenarios(path, catalogue, absent, options) for path in scenarios]
     unchecked = _list_unchecked(catalogue, imports, absent)
-    return Report(tuple(files), unchecked, options.is_strict)
+    notes = (types.note,) if types.note else ()
+    return Report(tuple(files), (*unchecked, *notes), options.is_strict)
 
 
 def _check_scenarios(
@@ -124,13 +125,6 @@ def _import_check() -> ImportCheck:
     from composer.runtime.behaviours.import_check import ImportCheck
 
     return ImportCheck()
-
-
-def _types_check(name: str | None) -> TypesCheck:
-    from composer.stubs.type_checkers import find_type_checker
-    from composer.stubs.types_check import TypesCheck
-
-    return TypesCheck(find_type_checker(name))
 
 
 def _select(words: Sequence[str], options: CheckOptions) -> Selection:

@@ -85,6 +85,8 @@ class IgnoreComments:
                 yield _warn(
                     named, 'unused-ignore', message, 'fix the error and remove the comment'
                 )
+        elif 'types' in (unchecked or ()) and named.source.name.endswith('.py'):
+            return
         elif unchecked is not None and load_rule(rule).needs not in unchecked:
             message = f"there is no '{rule}' in this line to ignore"
             yield _warn(named, 'unused-ignore', message, 'remove it')

@@ -35,8 +35,6 @@ WITHOUT = {
     'unread-module',
     # The net below the other rules of definitions; nothing is known that falls through them.
     'bad-syntax',
-    # It takes a type checker, and what other checks do not find.
-    'type-error',
 }
 ONLY_WHEN_IMPORTED = {'broken-behaviour'}
 

@@ -1,4 +1,4 @@
-"""Type checkers take just what Composer takes for a message, and so does `composer check --types`."""
+"""Type checkers take just what Composer takes for a message, and so does `composer check`."""
 
 import json
 import shutil
@@ -7,12 +7,12 @@ import sys
 
 import pytest
 
-from composer.checks.checker import create_context
+from composer.checks.checker import check_in_context, create_context
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.stubs import type_checkers
+from composer.stubs.checking import type_checker
+from composer.stubs.checking.kept_types import TypesCheck
 from composer.stubs.system_stubs import stand_ins, stubs_of
-from composer.stubs.types_check import TypesCheck
 
 pytestmark = pytest.mark.ros
 
@@ -164,13 +164,17 @@ def show(folder, numbers):
     return [lines[number - 1].strip() for number in sorted(numbers)]
 
 
-@pytest.mark.parametrize('checker', CHECKERS)
-def test_check_types_refuses_what_does_not_fit_and_nothing_else(tmp_path, monkeypatch, checker):
+def test_check_refuses_what_does_not_fit_and_types_find_nothing_else(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
     wrong = write_probes(tmp_path, annotated=False)
-    found = TypesCheck(type_checkers.find_type_checker(checker))(load(tmp_path), [])
-    assert show(tmp_path, {each.span.line for each in found}) == show(tmp_path, wrong)
+    context = load(tmp_path)
+    found = TypesCheck(type_checker.find_program())(context, [])
+    by_types = {each.span.line for each in found}
+    assert show(tmp_path, by_types - wrong) == []
+    assert len(by_types) > len(wrong) // 2
+    by_all = {each.span.line for each in check_in_context(context.system, context)} | by_types
+    assert show(tmp_path, by_all & {*wrong}) == show(tmp_path, wrong)
 
 
 @pytest.mark.parametrize('checker', CHECKERS)

@@ -1,4 +1,4 @@
-"""`composer check --types` finds what contradicts the declarations of a system, and nothing else."""
+"""`composer check` finds by types what contradicts the declarations of a system, and nothing else."""
 
 import shutil
 from pathlib import Path
@@ -9,53 +9,110 @@ from composer.checks.checker import create_context
 from composer.cli import main as cli
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.stubs import type_checkers
-from composer.stubs.types_check import TypesCheck
+from composer.stubs.checking import type_checker
+from composer.stubs.checking.kept_types import TypesCheck
 
-DATA = Path(__file__).resolve().parent.parent / 'data' / 'typed'
+DATA = Path(__file__).resolve().parent.parent / 'data'
+TYPED = DATA / 'typed'
+VALID = sorted(path.parent for path in (DATA / 'valid' / 'idioms').rglob('system.yaml'))
 
-pytestmark = pytest.mark.ros
-
-
-@pytest.fixture(scope='module')
-def found(tmp_path_factory):
-    """Check the types of a system once, as if no other check had found anything."""
-    folder = tmp_path_factory.mktemp('typed')
-    shutil.copytree(DATA, folder, dirs_exist_ok=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        patch.setenv('XDG_CACHE_HOME', str(folder / 'cache'))
-        context = create_context(load_system(Path('system.yaml')), InterfaceCatalogue())
-        return list(TypesCheck(type_checkers.find_type_checker('mypy'))(context, []))
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.skipif(type_checker.find_program() is None, reason='pyrefly is not installed'),
+]
 
 
-def test_every_error_is_found_in_its_line_and_no_other_line(found):
+def find_by_types(path):
+    """Return what is found by types, as if no other check had found anything."""
+    context = create_context(load_system(path), InterfaceCatalogue())
+    return TypesCheck(type_checker.find_program())(context, [])
+
+
+@pytest.fixture
+def typed(tmp_path, monkeypatch):
+    """Enter a copy of a system with errors; nothing was kept yet."""
+    shutil.copytree(TYPED, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
+    return tmp_path
+
+
+def test_every_error_is_found_in_its_line_and_no_other_line(typed):
     wanted = {
         (path.name, number)
-        for path in DATA.glob('*.py')
+        for path in typed.glob('*.py')
         for number, line in enumerate(path.read_text().splitlines(), start=1)
         if line.endswith('# error')
     }
+    found = find_by_types(Path('system.yaml'))
     assert {(each.span.source.name, each.span.line) for each in found} == wanted
-
-
-def test_columns_are_those_of_the_original(found):
-    lines = (DATA / 'driving.py').read_text().splitlines()
+    lines = (typed / 'driving.py').read_text().splitlines()
     number, line = next(each for each in enumerate(lines, start=1) if 'LONGEST' in each[1])
     (finding,) = (each for each in found if each.span.line == number)
-    assert finding.span.column == line.index('LaserScan') + 1
-    assert finding.message == '"type[LaserScan]" has no attribute "LONGEST"'
+    assert finding.span.column == line.index('LONGEST') + 1
+    assert finding.message.startswith("sensor_msgs/msg/LaserScan has no field 'LONGEST'")
 
 
-def test_without_a_type_checker_it_says_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(type_checkers.importlib.util, 'find_spec', lambda name: None)
-    monkeypatch.setenv('PATH', '')
-    (tmp_path / 'system.yaml').write_text('version: 1\nnodes: {rover: {on_start: driving:go}}\n')
-    assert cli.run(['check', '--types', 'system.yaml']) == 1
-    assert (
-        'neither mypy nor pyright is installed\n  help: pip install mypy'
-        in capsys.readouterr().err
+@pytest.mark.parametrize('folder', VALID, ids=lambda folder: folder.name)
+def test_right_programs_are_not_reported(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert [str(each.span) for each in find_by_types(Path('system.yaml'))] == []
+
+
+def test_what_two_checks_find_is_said_once(typed, capsys):
+    (typed / 'scaling.py').write_text(
+        'from geometry_msgs.msg import Vector3\n\n\n'
+        'def scale(node):\n'
+        "    if node.parameters.mode == 'hard':\n"
+        "        node.logger.info('hard')\n"
+        "    node.publish('status', node.parameters.sped)\n"
+        '    return {"angular": Vector3(x=1)}\n'
     )
-    assert cli.run(['check', 'system.yaml', '--types', 'pyright']) == 1
-    assert 'pyright is not installed\n  help: pip install pyright' in capsys.readouterr().err
+    text = (typed / 'system.yaml').read_text()
+    tick = 'tick: {period: 1.0, behaviour: driving:tick'
+    (typed / 'system.yaml').write_text(
+        text.replace(tick, tick.replace('driving:tick', 'scaling:scale'))
+    )
+    assert cli.run(['check', 'system.yaml', '--format', 'github']) == 1
+    out = capsys.readouterr().out
+    for rule in ('never-equal', 'unknown-parameter', 'field-type'):
+        assert sum('scaling.py' in line and rule in line for line in out.splitlines()) == 1, out
+
+
+def test_pyrefly_runs_again_only_after_a_change(typed, monkeypatch):
+    clean = Path('behaviour.py')
+    clean.write_text("def tick(node):\n    node.publish('status', 'on')\n")
+    Path('small.yaml').write_text(
+        'version: 1\nnodes:\n  small:\n'
+        '    publishers: {status: {type: std_msgs/msg/String, external: true}}\n'
+        '    timers: {tick: {period: 1.0, behaviour: behaviour:tick}}\n'
+    )
+    runs = []
+    run = type_checker.subprocess.run
+    monkeypatch.setattr(
+        type_checker.subprocess,
+        'run',
+        lambda *args, **kwargs: runs.append(args) or run(*args, **kwargs),
+    )
+    for text, rules in (
+        (None, []),
+        (None, []),
+        ("def tick(node):\n    node.publish('statsu', 'on')\n", ['unknown-publisher']),
+        (None, ['unknown-publisher']),
+    ):
+        if text:
+            clean.write_text(text)
+        before = len(runs)
+        assert [each.rule for each in find_by_types(Path('small.yaml'))] == rules
+        assert bool(len(runs) - before) == (text is not None or before == 0)
+
+
+def test_a_line_says_what_was_not_checked_or_by_an_untested_version(typed, monkeypatch, capsys):
+    cli.run(['check', 'system.yaml'])
+    assert 'pyrefly' not in capsys.readouterr().err
+    monkeypatch.setattr('composer.stubs.checking.kept_types.TESTED_VERSION', '0.0.1')
+    cli.run(['check', 'system.yaml'])
+    assert f'pyrefly {type_checker.TESTED_VERSION} is untested' in capsys.readouterr().err
+    monkeypatch.setattr('composer.application.check.find_program', lambda: None)
+    cli.run(['check', 'system.yaml'])
+    assert 'not checked without pyrefly: the types of behaviours' in capsys.readouterr().err

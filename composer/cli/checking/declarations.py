@@ -21,8 +21,6 @@ from composer.cli.common.argument_types import (
 )
 from composer.reports import FORMATS
 
-# What `check --types` can be followed by.
-TYPE_CHECKERS = ('mypy', 'pyright')
 # What a check or a plan imports and reads lives until its end: to look for garbage in it as often
 # as usual takes a fifth more.
 _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
@@ -67,12 +65,6 @@ _OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
     is_flag=True,
     help='Import the behaviours and check the functions, too. Runs the code of their modules.',
 )
-@click.option(
-    '--types',
-    is_flag=True,
-    help='Run a type checker over the behaviours, too: one that is installed, or the one that is '
-    'named, as in --types pyright (mypy or pyright).',
-)
 @click.option('--quiet', '-q', is_flag=True, help='Print only errors and warnings.')
 @click.option(
     '--skip-other-files',
@@ -101,7 +93,6 @@ def check_command(  # noqa: PLR0913 - one for each option
     ignored: tuple[str, ...],
     expected: tuple[str, ...],
     imports: bool,
-    types: bool,
     quiet: bool,
     skip_other_files: bool,
     strict_packages: bool,
@@ -118,17 +109,12 @@ def check_command(  # noqa: PLR0913 - one for each option
     from composer.application.check import CheckOptions
     from composer.cli.checking.check import ReportOptions, check
 
-    # The name of a type checker is a word of its own: the option works without.
-    type_checker = next((word for word in words if types and word in TYPE_CHECKERS), None)
-    words = tuple(word for word in words if word != type_checker)
     options = CheckOptions(
         set_values=set_values,
         matrix=matrix,
         is_strict=strict,
         ignored=ignored,
         imports=imports,
-        types=types,
-        type_checker=type_checker,
         skip_other_files=skip_other_files,
         strict_packages=strict_packages,
         stdin_name=stdin_filename,

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 _NEEDS = {
     'interfaces': 'Needs interface packages, which come with ROS 2.',
-    'types': '`composer check --types` finds it, with mypy or pyright.',
     'import': '`composer check --import` finds more than the source of the behaviour shows.',
 }
 

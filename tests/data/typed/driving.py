@@ -20,7 +20,8 @@ def tick(node):
     node.publish(f'stat{"us"}', 'on')
     light(node, on=node.parameters.speed > 1)
     if node.parameters['frame.id']:
-        helping.warn(node, node.parameters.sped)  # error
+        helping.warn(node, node.parameters.of_others)
+    helping.warn(node, node.parameters.sped)  # error
     return {'linear': {'x': 1, 'yy': 2}}  # error
 
 

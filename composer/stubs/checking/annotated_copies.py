@@ -12,18 +12,19 @@ import tokenize
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from composer.entity_kinds import PUBLISHED
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource
 from composer.records import record
+from composer.stubs.checking.received_values import changed_names, payload_of
 from composer.stubs.field_types import StubImports
-from composer.stubs.received_values import changed_names, payload_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.python_source.syntax import FunctionNode
+    from composer.stubs.checking.received_values import FunctionKey, FunctionUse, Received
     from composer.stubs.project_modules import ProjectModule
-    from composer.stubs.received_values import FunctionKey, FunctionUse, Received
 
 # The annotations that say less than the class of the node.
 _GENERAL = frozenset({'Node', 'composer.Node', 'Any', 'typing.Any', 'object'})
@@ -138,12 +139,16 @@ class Annotator:
     def _payload(self, use: FunctionUse, key: str) -> str | None:
         """Return the type of a payload; `None` if anything may be returned somewhere."""
         options: dict[str, None] = {}
+        # Nothing is published where nothing is returned; a service needs its response.
+        may_be_none = key == 'yielded'
         for node, binding in use.bindings:
-            name = payload_of(node, binding, getattr(binding.key, key))
+            part = getattr(binding.key, key)
+            name = payload_of(node, binding, part)
             if name is None:
                 return None
             options[self._imports.payload(name)] = None
-        return ' | '.join([*options, 'None'])
+            may_be_none |= part == PUBLISHED
+        return ' | '.join([*options, *(['None'] if may_be_none else [])])
 
 
 def _annotate(

@@ -1,0 +1,189 @@
+"""Run pyrefly, and read what it reports."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from composer.errors import ComposerError
+from composer.interfaces.build.build_cache import find_cache
+from composer.records import record
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+# The version whose messages are read; pyproject.toml pins it.
+TESTED_VERSION: Final = '1.4.1'
+_TIMEOUT_SEC = 60
+# As many results of runs are kept.
+_MOST_KEPT = 200
+_OPTIONS = ('--config', 'pyrefly.toml', '--output-format', 'json', '--summary=none')
+_NAMES = ('path', 'line', 'column', 'kind', 'message')
+# The presets differ from version to version, so each kind that is read is named. Whatever is not
+# in the stubs or the project is unknown: of libraries, nothing is reported.
+_SETTINGS = """\
+preset = "default"
+search-path = ["modules", "stubs"]
+site-package-path = []
+skip-interpreter-query = true
+disable-search-path-heuristics = true
+check-unannotated-defs = true
+infer-return-types = "checked"
+python-version = "{version}"
+project-includes = ["modules/**/*.py"]
+project-excludes = []
+
+[errors]
+bad-argument-count = true
+bad-argument-type = true
+bad-return = true
+bad-specialization = true
+incompatible-comparison = true
+missing-argument = true
+missing-attribute = true
+no-matching-overload = true
+not-async = true
+not-iterable = true
+read-only = true
+unexpected-keyword = true
+unsupported-operation = true
+unused-coroutine = true
+"""
+
+
+class TypeCheckerError(ComposerError):
+    """Pyrefly does not work."""
+
+
+@record
+class TypeReport:
+    """What pyrefly says about a place.
+
+    Attributes:
+        path: The file, in the folder of modules.
+        line: Counted from 1; columns likewise.
+        kind: Its own name for such errors.
+    """
+
+    path: str
+    line: int
+    column: int
+    kind: str
+    message: str
+
+
+@record
+class TypeResult:
+    """What a run of pyrefly gave.
+
+    Attributes:
+        is_clean: Whether no report became a finding.
+    """
+
+    version: str
+    reports: tuple[TypeReport, ...]
+    is_clean: bool = False
+
+
+def find_program() -> Path | None:
+    """Return pyrefly: that beside Composer's own Python, or one on the `PATH`."""
+    own = Path(sys.executable).parent / 'pyrefly'
+    on_path = None if own.exists() else shutil.which('pyrefly')
+    if on_path is not None:
+        return Path(on_path)
+    return own if own.exists() else None
+
+
+def run_type_checker(
+    program: Path, modules: Mapping[str, str], stubs: Mapping[str, str]
+) -> TypeResult:
+    """Check modules.
+
+    Args:
+        modules: The source of each, by its path; `stubs` likewise.
+
+    Raises:
+        TypeCheckerError: Pyrefly does not work.
+    """
+    version = '.'.join(map(str, sys.version_info[:2]))
+    files = {
+        'pyrefly.toml': _SETTINGS.format(version=version),
+        **{f'modules/{path}': text for path, text in modules.items()},
+        **{f'stubs/{path}': text for path, text in stubs.items()},
+    }
+    with tempfile.TemporaryDirectory(prefix='composer-types-') as name:
+        folder = Path(os.path.realpath(name))
+        for path, text in files.items():
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(text, encoding='utf-8')
+        text = _run(
+            program, ['check', *_OPTIONS, '--relative-to', str(folder / 'modules')], folder
+        )
+    try:
+        reports = json.loads(text)['errors']
+    except (ValueError, KeyError) as error:
+        message = f'pyrefly does not work: it printed {text.strip()[-500:]!r}'
+        raise TypeCheckerError(message) from error
+    keys = ('path', 'line', 'column', 'name', 'description')
+    return TypeResult(
+        _run(program, ['--version']).strip().removeprefix('pyrefly '),
+        tuple(TypeReport(*(report[key] for key in keys)) for report in reports),
+    )
+
+
+def load_result(digest: str) -> TypeResult | None:
+    """Return the result that was kept for a digest, if there is one."""
+    try:
+        kept = json.loads(_place_of(digest).read_bytes())
+        reports = tuple(TypeReport(*report) for report in kept['reports'])
+        return TypeResult(kept['version'], reports, kept['is_clean'])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def keep_result(digest: str, result: TypeResult) -> None:
+    """Keep a result; where nothing can be written, the next run is like the first."""
+    place = _place_of(digest)
+    reports = [[getattr(report, name) for name in _NAMES] for report in result.reports]
+    kept = {'version': result.version, 'reports': reports, 'is_clean': result.is_clean}
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile('w', dir=place.parent, delete=False) as file:
+            json.dump(kept, file)
+        Path(file.name).replace(place)
+        results = sorted(place.parent.glob('*.json'), key=lambda path: path.stat().st_mtime)
+        for path in results[:-_MOST_KEPT]:
+            path.unlink(missing_ok=True)
+    except OSError:
+        return
+
+
+def _place_of(digest: str) -> Path:
+    return find_cache().parent / 'types' / f'{digest}.json'
+
+
+def _run(program: Path, arguments: list[str], folder: Path | None = None) -> str:
+    """Return what pyrefly prints; with errors in the modules, it exits with 1."""
+    try:
+        done = subprocess.run(  # noqa: S603 - a program of the installation
+            [str(program), *arguments],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_SEC,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        message = f'pyrefly does not work: {error}'
+        raise TypeCheckerError(message) from error
+    if done.returncode not in (0, 1):
+        message = f'pyrefly does not work: {(done.stderr or done.stdout).strip()[-500:]}'
+        raise TypeCheckerError(message)
+    return done.stdout

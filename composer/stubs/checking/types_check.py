@@ -1,0 +1,174 @@
+"""Have the behaviours of a system checked by pyrefly: stubs, annotated copies, and findings."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator
+from composer.stubs.checking.left_alone import LeftAlone
+from composer.stubs.checking.received_values import find_received_values
+from composer.stubs.checking.type_checker import run_type_checker
+from composer.stubs.checking.type_findings import TypeFindings
+from composer.stubs.field_types import SUPPORT
+from composer.stubs.node_shapes import NodeShape, merge_shapes
+from composer.stubs.node_stubs import write_nodes
+from composer.stubs.project_modules import all_nodes
+from composer.stubs.system_stubs import (
+    class_name,
+    module_of,
+    shapes_of,
+    stand_ins,
+    text_of,
+    write_messages,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
+
+    from composer.checks.context import CheckContext
+    from composer.diagnostics import Diagnostic
+    from composer.language.specs import NodeSpec
+    from composer.stubs.checking.type_checker import TypeResult
+    from composer.stubs.project_modules import ProjectModule
+
+_CLASS = re.compile(r'^class (\w+)', re.MULTILINE)
+_OF_ROS = re.compile(r'^(composer|rclpy)\.|\.(msg|srv|action)\.')
+# A behaviour of more nodes than these has a class that is named after the first ones.
+_MOST_NAMED = 3
+
+
+def find_type_errors(
+    program: Path,
+    context: CheckContext,
+    modules: dict[str, ProjectModule],
+    result: TypeResult | None,
+    found: list[Diagnostic],
+) -> tuple[list[Diagnostic], TypeResult]:
+    """Return what is wrong where the other checks found nothing, and the result of pyrefly.
+
+    Args:
+        modules: Those of the project.
+        result: That of an earlier run over the same; `None` if there is none.
+        found: What the other checks found.
+
+    Raises:
+        TypeCheckerError: Pyrefly does not work.
+    """
+    classes = _Classes(module_of(context), shapes_of(context, modules), all_nodes(context))
+    annotator = Annotator(find_received_values(context, modules), classes.of)
+    copies = {module.path: annotator.copy(module) for module in modules.values()}
+    files = dict(write_messages(context, modules))
+    files |= classes.files() | stand_ins(context.spec.qos)
+    if result is None:
+        texts = {path: copy.text for path, copy in copies.items()}
+        result = run_type_checker(program, texts, files)
+    findings = TypeFindings(
+        context,
+        classes.nodes_by_name(),
+        classes.shapes_by_name(),
+        annotator.functions,
+        _message_classes(files),
+        _own_names(modules) | _changed_classes(modules),
+        frozenset(modules),
+    )
+    every, kept = [], []
+    for path, copy in copies.items():
+        places = LeftAlone(copy)
+        told = {*_lines_told(found, copy)}
+        reports = [report for report in result.reports if report.path == path]
+        for finding, lines in findings.explain_all(places, reports):
+            every.append(finding)
+            if not told & {*lines}:
+                told.add(lines[0])
+                kept.append(finding)
+    return kept, replace(result, is_clean=not every)
+
+
+@dataclass(slots=True)
+class _Classes:
+    """The classes of nodes, and of nodes together that have a behaviour in common."""
+
+    module: str
+    shapes: dict[str, NodeShape]
+    nodes: list[NodeSpec]
+    _names: dict[NodeShape, str] = field(default_factory=dict)
+    _nodes: dict[str, list[NodeSpec]] = field(default_factory=dict)
+
+    def of(self, keys: Iterable[str]) -> tuple[str, str]:
+        """Return the module and the name of the class of nodes, by their keys in the file."""
+        several = list(keys)
+        shape = merge_shapes(self.shapes[key] for key in several)
+        if shape not in self._names:
+            name = 'Or'.join(map(class_name, several[:_MOST_NAMED]))
+            taken = name in self._names.values()
+            self._names[shape] = f'{name}_{len(self._names)}' if taken else name
+        nodes = self._nodes.setdefault(self._names[shape], [])
+        nodes += [node for node in self.nodes if node.key in several and node not in nodes]
+        return f'{SUPPORT}.{self.module}', self._names[shape]
+
+    def shapes_by_name(self) -> dict[str, NodeShape]:
+        """Return the shape of each class that was asked for."""
+        return {name: shape for shape, name in self._names.items()}
+
+    def nodes_by_name(self) -> dict[str, list[NodeSpec]]:
+        """Return the nodes that each class that was asked for stands for."""
+        return self._nodes
+
+    def files(self) -> dict[str, str]:
+        """Return the stub with the classes that were asked for, by its path."""
+        classes = self.shapes_by_name()
+        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes, self.nodes))
+        return {f'{SUPPORT}/{self.module}.pyi': text}
+
+
+def _message_classes(files: dict[str, str]) -> dict[str, str]:
+    """Return the full names of messages by their classes; empty if several have one name."""
+    names: dict[str, str] = {}
+    for path, text in files.items():
+        package, kind, *rest = path.split('/')
+        if rest and kind in ('msg', 'srv', 'action'):
+            for name in _CLASS.findall(text):
+                names[name] = '' if name in names else f'{package}/{kind}/{name}'
+    return names
+
+
+def _own_names(modules: dict[str, ProjectModule]) -> frozenset[str]:
+    """Return the names of what the modules define, or import from anywhere but ROS."""
+    defined = (
+        node.name
+        for module in modules.values()
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.ClassDef)
+    )
+    imported = (
+        name
+        for module in modules.values()
+        for name, full_name in module.source.imports.items()
+        if not _OF_ROS.search(full_name)
+    )
+    return frozenset([*defined, *imported])
+
+
+def _changed_classes(modules: dict[str, ProjectModule]) -> frozenset[str]:
+    """Return the names of the classes to which the modules add attributes."""
+    return frozenset(
+        node.value.id
+        for module in modules.values()
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.ctx, ast.Store)
+        and isinstance(node.value, ast.Name)
+    )
+
+
+def _lines_told(found: list[Diagnostic], copy: AnnotatedCopy) -> Iterator[int]:
+    """Yield the lines of a module in which the other checks found something."""
+    name = copy.module.source.place_of(1).source.name
+    for finding in found:
+        for span in (finding.span, *(related.span for related in finding.related)):
+            if span is not None and span.source.name == name:
+                yield span.line
