@@ -12,6 +12,8 @@ class ExitCode(IntEnum):
     FAILED = 1
     USAGE = 2
     BUG = 3
+    # As Ansible has it: a host cannot be reached.
+    UNREACHABLE = 4
     # As pytest has it: there was no test to run.
     NOTHING_COLLECTED = 5
     # As shells have it: 128 and the number of SIGINT.

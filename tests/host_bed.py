@@ -143,7 +143,8 @@ class Bed:
     def environment(self, **more):
         """Return the environment of the laptop's user: the home is another one."""
         kept = {key: value for key, value in os.environ.items() if key != 'SSH_AUTH_SOCK'}
-        return {**kept, 'HOME': str(self.home), **more}
+        programs = f'{self.home}/bin:{kept["PATH"]}'
+        return {**kept, 'HOME': str(self.home), 'PATH': programs, **more}
 
     def run(self, *words, **options):
         """Run a program on the laptop; the result has its output as text."""
@@ -188,6 +189,12 @@ class Bed:
             f'Include {ssh}/config\nHost *\n  IdentityFile {ssh}/id_ed25519\n'
             f'  UserKnownHostsFile {ssh}/known_hosts\n  BatchMode yes\n'
         )
+        program = self.home / 'bin/ssh'
+        program.parent.mkdir()
+        program.write_text(
+            f'#!/bin/sh\nexec {shutil.which("ssh")} -F {self.folder}/ssh_config "$@"\n'
+        )
+        program.chmod(0o755)
         self.know_hosts()
         for host in self.hosts.values():
             host.boot(waits=False)

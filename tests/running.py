@@ -26,9 +26,9 @@ _domain_offsets = count(os.getpid() * 7)
 _peers = []
 
 
-def wait_for(condition, what):
+def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
     """Return the first true result of `condition`; fail after a deadline, or as a peer has."""
-    deadline = time.monotonic() + DEADLINE_SEC
+    deadline = time.monotonic() + timeout_sec
     while not (result := condition()):
         for peer in _peers:
             peer.check()

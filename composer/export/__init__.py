@@ -21,6 +21,8 @@ FORMS: dict[str, str] = {
 
 # Documents about the nodes, which run nothing.
 NODL = 'nodl'
+# A folder with all that hosts are brought: `composer.hosts.bundle`.
+ANSIBLE = 'ansible'
 
 
 def render_files(export: Export) -> dict[str, str]:

@@ -110,9 +110,10 @@ def render_unit(  # noqa: PLR0913 - a line of the unit each
     """Return the text of a unit.
 
     Args:
-        command: The program, an absolute path, and its arguments: no shell reads them.
+        command: The program, an absolute path, and its arguments: no shell reads them, but `~/` is
+            the home of the user.
         description: One line; what else it has is left out.
-        folder: The working directory, an absolute path.
+        folder: The working directory, an absolute path, or from `~/`.
         stop_sec: After this long in its stop the service is killed.
         scope: Whose manager runs it: that of a user, or that of the system.
         environment: Variables to set, by name; nothing confidential, as anybody may read them.
@@ -174,7 +175,12 @@ def _command(words: Sequence[str]) -> str:
         message = f'systemd cannot run {words[0]!r}: no absolute path, or one with quotes'
         raise ComposerError(message)
     # With the colon, systemd replaces no `$NAME`: that it cannot be escaped in the program's path.
-    return ' '.join([f':{quote(words[0])}', *map(quote, words[1:])])
+    return f':{" ".join(map(_word, words))}'
+
+
+def _word(word: str) -> str:
+    # No shell is there to find the home of the user.
+    return f'%h{quote(word[1:])}' if word.startswith('~/') else quote(word)
 
 
 def _escaped(found: re.Match[str]) -> str:
@@ -186,6 +192,8 @@ def _escaped(found: re.Match[str]) -> str:
 
 def _path(path: str) -> str:
     """Return a path as it stands alone in a line, where nothing but specifiers is replaced."""
+    if path.startswith('~/'):
+        return f'%h{_path(path[1:])}'
     if not path.startswith('/') or any(ord(each) < ord(' ') for each in path):
         message = f'systemd cannot be given {path!r}: it is no absolute path without line breaks'
         raise ComposerError(message)

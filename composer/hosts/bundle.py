@@ -1,14 +1,20 @@
-"""A system as its hosts are brought it."""
+"""A system as a folder for Ansible: inventory, playbooks, and what each host is brought."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from dataclasses import replace
+from importlib.resources import files as resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import UsageError
-from composer.hosts.host_parts import Part, PartSources, build_part
-from composer.hosts.project_files import build_behaviours, collect_files
+from composer.export import ANSIBLE
+from composer.export.documents import render_document
+from composer.export.written_files import mark, write_files
+from composer.hosts.host_parts import PartSources, folder_of, write_change, write_part
+from composer.hosts.project_files import collect_files, read_behaviours
 from composer.hosts.requirements import (
     PlatformSpec,
     composer_requirements,
@@ -16,20 +22,28 @@ from composer.hosts.requirements import (
     project_requirements,
     provide_wheels,
 )
-from composer.hosts.wheels import build_composer_wheel
+from composer.hosts.wheels import write_composer_wheel
 from composer.network.servers import used_hosts
 from composer.network.variables import ros_variables
-from composer.planning.differences import keep_start
-from composer.planning.snapshot_data import KEY_OF_ALL, encode_snapshot
 from composer.planning.snapshot_taking import take_snapshot
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import HostSpec, SystemSpec
+
+GROUP = 'composer'
+PLAYBOOKS = ('deploy.yaml', 'remove.yaml')
+_SETTINGS = 'ansible.cfg'
+_KEYS = {
+    'address': 'ansible_host',
+    'user': 'ansible_user',
+    'port': 'ansible_port',
+    'identity_file': 'ansible_ssh_private_key_file',
+    'python': 'ansible_python_interpreter',
+}
 
 
 class Bundle:
@@ -40,7 +54,7 @@ class Bundle:
         given: The file and its layers.
         named: All files that were read.
         words: The arguments of the command line that come after the files.
-        read: The variables of the environment that the files read, and whether they are set here.
+        read: The variables of the environment that the files read.
         addresses: Where hosts look for others, by their names, if not at their addresses: these
             may be names that only ssh here knows.
     """
@@ -51,57 +65,73 @@ class Bundle:
         given: Sequence[Path],
         named: Iterable[Path],
         words: Sequence[str],
-        read: Mapping[str, bool],
+        read: Collection[str],
         addresses: Mapping[str, str],
     ) -> None:
         self._context, self._read, self._addresses = context, read, addresses
-        # Modules come in wheels.
         modules = set(context.modules.list_files())
         others = [path for path in named if path not in modules]
         self._files = collect_files(given, others, context.spec)
-        paths = [os.path.relpath(path, self._files.folder) for path in given]
-        self._words = [*paths, *words]
-        self._composer = build_composer_wheel()
+        self._given = [os.path.relpath(path, self._files.folder) for path in given]
+        sought = addresses.items()
+        self._words = [*words, *(f'--set=hosts.{name}.address={at}' for name, at in sought)]
 
-    @property
-    def needed_variables(self) -> list[str]:
-        """The variables that must be set on each host: those that are set here."""
-        return [name for name, is_set in self._read.items() if is_set]
+    def write(
+        self,
+        folder: Path,
+        hosts: Sequence[HostSpec],
+        targets: Mapping[str, PlatformSpec] | None = None,
+    ) -> list[Path]:
+        """Write all into a folder; return the paths of what people may change.
 
-    def build(self, hosts: Iterable[HostSpec], facts: Mapping[str, Any]) -> dict[str, Part]:
-        """Return what each host is brought, by its name.
+        Args:
+            targets: What the hosts are, by their names; without, they are as this computer.
 
         Raises:
-            ComposerError: Something that a host needs is not there.
+            ComposerError: Something that a host needs is not there, or a file was edited.
         """
-        return {host.name: self._build(host, facts[host.name]) for host in hosts}
+        paths = write_playbooks(folder, self._context.spec, hosts)
+        for name in ('hosts', 'wheels'):
+            shutil.rmtree(folder / name, ignore_errors=True)
+            (folder / name).mkdir()
+        composer = write_composer_wheel(folder / 'wheels')
+        used = used_hosts(self._context.spec)
+        for host in hosts:
+            part = folder / 'hosts' / host.name
+            if host.name not in used:
+                # Whatever it runs is stopped and removed.
+                write_change(self._context.spec.name, host, part)
+                continue
+            target = (targets or {}).get(host.name) or PlatformSpec.own()
+            sources = self._collect(host, target, composer)
+            for wheel in sources.wheels:
+                if wheel != composer:
+                    shutil.copy2(wheel, folder / 'wheels')
+            write_part(sources, part)
+        return [*paths, folder / 'hosts', folder / 'wheels']
 
-    def _build(self, host: HostSpec, facts: Mapping[str, Any]) -> Part:
+    def _collect(self, host: HostSpec, target: PlatformSpec, composer: Path) -> PartSources:
         spec = self._with_addresses(self._context.spec.on_host(host.name))
         # A copy asks for the part; what was read stays read.
         snapshot = take_snapshot(replace(self._context, spec=spec))
-        python = facts['python']
-        target = PlatformSpec((python[0], python[1]), facts['machine'], facts['libc'])
         required = [
             *composer_requirements(
-                has_ros=bool(facts['ros']), builds_interfaces=bool(spec.interfaces)
+                has_ros=bool(target.ros), builds_interfaces=bool(spec.interfaces)
             ),
             *project_requirements(self._files.marks),
         ]
-        sources = PartSources(
+        return PartSources(
             spec=spec,
             host=host,
             files=self._files,
+            given=self._given,
             words=self._words,
-            wheels=build_behaviours(self._context, snapshot, self._files),
-            required=provide_wheels(pin(required, target), target),
-            composer=self._composer,
+            behaviours=read_behaviours(self._context, snapshot),
+            wheels=[composer, *provide_wheels(pin(required, target), target).values()],
+            target=target,
             variables=ros_variables(spec),
-            start=encode_snapshot(keep_start(snapshot), KEY_OF_ALL),
-            hosts=choose_hosts(self._context.spec),
             read=self._read,
         )
-        return build_part(sources, facts)
 
     def _with_addresses(self, spec: SystemSpec) -> SystemSpec:
         hosts = {
@@ -111,8 +141,36 @@ class Bundle:
         return replace(spec, hosts=hosts)
 
 
+def write_playbooks(folder: Path, spec: SystemSpec, hosts: Sequence[HostSpec]) -> list[Path]:
+    """Write inventory, playbooks and settings of Ansible into a folder; return their paths.
+
+    Raises:
+        ComposerError: One is there that was edited.
+    """
+    source = resources('composer.hosts') / 'ansible'
+    texts = {name: (source / name).read_text(encoding='utf-8') for name in (*PLAYBOOKS, _SETTINGS)}
+    texts['inventory.yaml'] = render_document(_describe(spec, hosts))
+    return write_files(folder, {name: mark(ANSIBLE, text) for name, text in texts.items()})
+
+
+def _describe(spec: SystemSpec, hosts: Sequence[HostSpec]) -> dict[str, Any]:
+    entries = {}
+    for host in hosts:
+        given = {name: getattr(host, key) for key, name in _KEYS.items()}
+        if host.identity_file:
+            path = Path(host.identity_file).expanduser()
+            given['ansible_ssh_private_key_file'] = str(path)
+        entries[host.name] = {
+            **{name: value for name, value in given.items() if value},
+            'composer_root': folder_of(spec.name, host),
+        }
+    # How long a host waits for the next step, before it goes back.
+    variables = {'composer_rollback_sec': 90}
+    return {GROUP: {'vars': variables, 'hosts': entries}}
+
+
 def choose_hosts(spec: SystemSpec, wanted: Sequence[str] = ()) -> list[HostSpec]:
-    """Return the hosts that run a part of a system.
+    """Return the hosts of a system: those that run a part, and that may have run one.
 
     Args:
         wanted: Those that were asked for; empty for all.
@@ -128,9 +186,4 @@ def choose_hosts(spec: SystemSpec, wanted: Sequence[str] = ()) -> list[HostSpec]
             advice = suggest(name, spec.hosts, 'there are')
             message = f"'{spec.name}' has no host '{name}'"
             raise UsageError(message, help=advice)
-    used = used_hosts(spec)
-    return [
-        host
-        for name, host in spec.hosts.items()
-        if name in used and (not wanted or name in wanted)
-    ]
+    return [host for name, host in spec.hosts.items() if not wanted or name in wanted]

@@ -1,4 +1,4 @@
-"""The files of a project that a system needs, and the wheels of its behaviours."""
+"""The files of a project that a system needs, and its behaviours."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from composer.confidential import list_lineage
 from composer.export.project import list_project_files
-from composer.hosts.wheels import Wheel, build_wheel, read_folder
+from composer.hosts.wheels import read_folder
 from composer.python_source.module_finder import MissingModule
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import SystemSpec
@@ -40,8 +40,10 @@ class ProjectFiles:
     marks: tuple[Path, ...]
 
     def place(self, path: Path) -> str:
-        """Return where a file or folder is, seen from the root."""
-        return path.relative_to(self.root).as_posix()
+        """Return where a file or folder is, seen from the root; others get places of their own."""
+        if path.is_relative_to(self.root):
+            return path.relative_to(self.root).as_posix()
+        return f'.beside/{"/".join(path.parts[1:])}'
 
 
 def collect_files(given: Sequence[Path], named: Iterable[Path], spec: SystemSpec) -> ProjectFiles:
@@ -65,44 +67,25 @@ def collect_files(given: Sequence[Path], named: Iterable[Path], spec: SystemSpec
     return ProjectFiles(root, folder, tuple(paths), tuple(dict.fromkeys([folder, *marks])))
 
 
-def build_behaviours(
-    context: CheckContext, part: Snapshot, files: ProjectFiles
-) -> dict[Path, Wheel]:
-    """Return a wheel of the behaviours of a part for each folder that it imports modules from.
+def read_behaviours(context: CheckContext, part: Snapshot) -> dict[Path, dict[str, bytes]]:
+    """Return the behaviours of a part, by the folder that it imports their modules from.
 
-    A wheel has whole packages, with their data, and of those only what the part imports.
+    Packages are whole, with their data; only those that the part imports.
     """
-    tops: dict[Path, dict[str, Path]] = {}
+    behaviours: dict[Path, dict[str, bytes]] = {}
     for name in filter(context.modules.is_of_project, part.code):
-        found = context.modules.find(name)
-        if isinstance(found, MissingModule) or found.path is None:
+        module = context.modules.find(name)
+        if isinstance(module, MissingModule) or module.path is None:
             continue
         words = name.split('.')
-        depth = len(words) - (found.path.name != '__init__.py')
-        folder = _absolute(found.path).parents[depth]
-        top = folder / words[0]
-        tops.setdefault(folder, {})[words[0]] = top if top.is_dir() else found.path
-    return {
-        folder: build_wheel(_wheel_name(files, folder), _read(found, folder))
-        for folder, found in tops.items()
-    }
-
-
-def _read(found: Mapping[str, Path], folder: Path) -> dict[str, bytes]:
-    files: dict[str, bytes] = {}
-    for name, path in found.items():
-        if path.is_dir():
-            files |= {f'{name}/{inner}': data for inner, data in read_folder(path)}
-        else:
-            files[path.relative_to(folder).as_posix()] = path.read_bytes()
-    return files
-
-
-def _wheel_name(files: ProjectFiles, folder: Path) -> str:
-    inside = files.place(folder) if folder.is_relative_to(files.root) else folder.name
-    words = (inside if inside != '.' else files.root.name).replace('/', '_')
-    safe = ''.join(each if each.isalnum() and each.isascii() else '_' for each in words)
-    return f'behaviours_{safe.strip("_") or "project"}'.lower()
+        depth = len(words) - (module.path.name != '__init__.py')
+        folder = _absolute(module.path).parents[depth]
+        top, read = folder / words[0], behaviours.setdefault(folder, {})
+        if not top.is_dir():
+            read[module.path.name] = module.path.read_bytes()
+        elif not any(inner.startswith(f'{top.name}/') for inner in read):
+            read |= {f'{top.name}/{inner}': data for inner, data in read_folder(top)}
+    return behaviours
 
 
 def _absolute(path: Path) -> Path:

@@ -37,11 +37,20 @@ class PlatformSpec:
         python: Major and minor version.
         machine: As `uname -m` says it.
         glibc: Its version, as in `2.36`; empty if it has another C library.
+        ros: The distribution of its ROS 2 in /opt/ros; empty for none.
     """
 
     python: tuple[int, int]
     machine: str
     glibc: str
+    ros: str = ''
+
+    @classmethod
+    def own(cls) -> PlatformSpec:
+        """Return what this computer is."""
+        distribution = os.environ.get('ROS_DISTRO', '')
+        ros = distribution if Path('/opt/ros', distribution, 'setup.sh').is_file() else ''
+        return cls(sys.version_info[:2], platform.machine(), platform.libc_ver()[1], ros)
 
     @property
     def is_own(self) -> bool:

@@ -1,4 +1,4 @@
-"""Wheels of what a project has in source: the same files make the same bytes.
+"""A wheel of Composer: the same files make the same bytes.
 
 Source: https://packaging.python.org/en/latest/specifications/binary-distribution-format/
 """
@@ -14,64 +14,35 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer import schema
-from composer.records import record
 from composer.schema import schema_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 _PACKAGE = Path(schema.__file__).parent.parent
-_DISTRIBUTION = 'rclpy-composer'
+_DISTRIBUTION, _NAME = 'rclpy-composer', 'rclpy_composer'
 _SCHEMAS = ('composer', 'plan', 'report', 'scenario', 'test_report')
 _NO_SOURCES = frozenset({'__pycache__', 'node_modules'})
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _FILE_MODE = 0o644 << 16
 
 
-@record
-class Wheel:
-    """A wheel.
-
-    Attributes:
-        name: Of its file.
-        data: The file.
-        files: The SHA-256 of each file in it, by its path.
-    """
-
-    name: str
-    data: bytes
-    files: Mapping[str, str]
-
-    @property
-    def digest(self) -> str:
-        """The SHA-256 of the file."""
-        return hashlib.sha256(self.data).hexdigest()
-
-
-def build_wheel(name: str, files: Mapping[str, bytes]) -> Wheel:
-    """Return a wheel of files; its version tells whether they are the same."""
-    total = hashlib.sha256()
-    for path, data in sorted(files.items()):
-        total.update(f'{path}\0{len(data)}\0'.encode() + data)
-    version = f'0+{total.hexdigest()[:12]}'
-    metadata = f'Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n'
-    return _write_wheel(name, version, files, metadata)
-
-
-def build_composer_wheel() -> Wheel:
-    """Return a wheel of the Composer that runs, whether it is installed or a source tree."""
+def write_composer_wheel(folder: Path) -> Path:
+    """Write a wheel of the Composer that runs, whether it is installed or a source tree."""
     files = {f'composer/{path}': data for path, data in read_folder(_PACKAGE)}
     shipped = _PACKAGE.parent / 'behaviours'
     files |= {f'behaviours/{path}': data for path, data in read_folder(shipped)}
-    for each in _SCHEMAS:
-        name = f'{each}.schema.json'
+    for schema_name in _SCHEMAS:
+        name = f'{schema_name}.schema.json'
         files[f'composer/schemas/{name}'] = schema_path(name).read_bytes()
     try:
-        found = distribution(_DISTRIBUTION)
+        installed = distribution(_DISTRIBUTION)
     except PackageNotFoundError:
-        return build_wheel('rclpy_composer', files)
-    metadata = found.read_text('METADATA') or ''
-    return _write_wheel('rclpy_composer', found.version, files, metadata)
+        version = '0'
+        metadata = f'Metadata-Version: 2.1\nName: {_DISTRIBUTION}\nVersion: {version}\n'
+    else:
+        version, metadata = installed.version, installed.read_text('METADATA') or ''
+    return _write_wheel(folder, version, files, metadata)
 
 
 def read_folder(folder: Path) -> Iterator[tuple[str, bytes]]:
@@ -83,8 +54,8 @@ def read_folder(folder: Path) -> Iterator[tuple[str, bytes]]:
             yield path.relative_to(folder).as_posix(), path.read_bytes()
 
 
-def _write_wheel(name: str, version: str, files: Mapping[str, bytes], metadata: str) -> Wheel:
-    info = f'{name}-{version}.dist-info'
+def _write_wheel(folder: Path, version: str, files: Mapping[str, bytes], metadata: str) -> Path:
+    info = f'{_NAME}-{version}.dist-info'
     tags = 'Wheel-Version: 1.0\nGenerator: composer\nRoot-Is-Purelib: true\nTag: py3-none-any\n'
     members = {**files, f'{info}/METADATA': metadata.encode(), f'{info}/WHEEL': tags.encode()}
     lines = [f'{path},{_hash(data)},{len(data)}' for path, data in sorted(members.items())]
@@ -95,8 +66,11 @@ def _write_wheel(name: str, version: str, files: Mapping[str, bytes], metadata: 
             entry = zipfile.ZipInfo(path, _EPOCH)
             entry.external_attr = _FILE_MODE
             archive.writestr(entry, data, zipfile.ZIP_DEFLATED)
-    digests = {path: hashlib.sha256(data).hexdigest() for path, data in members.items()}
-    return Wheel(f'{name}-{version}-py3-none-any.whl', stream.getvalue(), digests)
+    # A build tag tells sources of one version apart.
+    build = hashlib.sha256(members[f'{info}/RECORD']).hexdigest()[:12]
+    wheel = folder / f'{_NAME}-{version}-0_{build}-py3-none-any.whl'
+    wheel.write_bytes(stream.getvalue())
+    return wheel
 
 
 def _hash(data: bytes) -> str:

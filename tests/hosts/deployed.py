@@ -19,6 +19,7 @@ from tests.host_bed import Bed
 from tests.running import ROOT, wait_for
 
 FOLDER = '/home/robot/.local/share/composer'
+ROOT_THERE = f'{FOLDER}/systems/robot'
 UNITS = '/home/robot/.config/systemd/user'
 HOSTS = ('front', 'rear')
 _SYSTEM = """
@@ -146,7 +147,7 @@ class Project:
 
     def _has_all(self, name):
         state, _ = self.state(name)
-        live = self.bed[name].files / f'{FOLDER[1:]}/systems/robot/live/files'
+        live = self.bed[name].files / f'{ROOT_THERE[1:]}/live/files'
         with suppress(FileNotFoundError):
             same = [
                 (live / each).read_text() == (self.folder / each).read_text() for each in _FILES
@@ -170,21 +171,16 @@ class Project:
     def run(self, *words, system='robot.yaml'):
         return self.bed.run(*self.words(*words, system=system), **self.options)
 
-    def deploy(self, *words, system='robot.yaml'):
+    def deploy(self, *words, system='robot.yaml', code=0):
         done = self.run('deploy', *words, system=system)
-        assert not done.returncode, done.stderr
+        assert done.returncode == code, done.stdout + done.stderr
         return done
 
-    def fail(self, *words, system='robot.yaml'):
-        done = self.run('deploy', *words, system=system)
-        assert done.returncode == 1, done.stdout + done.stderr
-        return done.stderr
-
-    def begin(self):
+    def begin(self, *words):
         """Start a deployment; it goes on in a process of its own."""
-        words = self.bed.command(*self.words('deploy'))
+        command = self.bed.command(*self.words('deploy', *words))
         pipe = subprocess.PIPE
-        return subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, **self.options)
+        return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, **self.options)
 
     def states(self, system='robot'):
         """Return what systemd says of the units, and which process and release they run."""
@@ -196,15 +192,15 @@ class Project:
         shown = self.bed[name].run('systemctl', '--user', 'show', '-p', names, unit).stdout
         found = dict(line.split('=') for line in shown.split())
         root = f'{FOLDER}/systems/{system}'
-        release = self.bed[name].run('readlink', f'{root}/current').stdout.strip()
-        pending = not self.bed[name].run('readlink', f'{root}/pending').returncode
+        release = self.bed[name].run('cat', f'{root}/current').stdout.strip()
+        pending = not self.bed[name].run('test', '-e', f'{root}/pending').returncode
         return (found['ActiveState'], found['UnitFileState'], release, pending), found['MainPID']
 
     def pids(self):
         return [pid for _, pid in self.states()]
 
     def releases(self):
-        """Return the release that each host runs; they number them themselves."""
+        """Return the release that each host runs."""
         return [release for (_, _, release, _), _ in self.states()]
 
     def runs(self, releases):

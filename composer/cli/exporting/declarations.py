@@ -8,11 +8,11 @@ import click
 
 from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, split_words, takes_system
 from composer.errors import UsageError
-from composer.export import FORMS, NODL
+from composer.export import ANSIBLE, FORMS, NODL
 
 
 @click.command('export', context_settings=NUMBERS_ARE_VALUES)
-@click.argument('form', metavar='FORM', type=click.Choice([*FORMS, NODL]))
+@click.argument('form', metavar='FORM', type=click.Choice([*FORMS, ANSIBLE, NODL]))
 @takes_system
 @click.option(
     '--output',
@@ -46,22 +46,29 @@ def export_command(
     *,
     is_of_user: bool | None,
 ) -> int:
-    """Write units, a Compose file or manifests that run FILE.
+    """Write units, manifests or playbooks that run FILE.
 
     FORM is systemd, compose or kubernetes, with a service for each host of FILE, or one for all;
-    or nodl, with a document about each node. Layers, arguments, --set and --ros-args are those
-    that 'composer up' will be given. Values of environment variables that FILE reads stand in no
-    file: each says how to give them.
+    ansible, a folder with what 'composer deploy' runs; or nodl, with a document about each node.
+    Layers, arguments, --set and --ros-args are those that 'composer up' will be given. Values of
+    environment variables that FILE reads stand in no file: each says how to give them.
     """
-    from composer.cli.exporting.export import export
-
-    if form in {'systemd', NODL} and image:
+    if form in {'systemd', ANSIBLE, NODL} and image:
         message = '--image is for compose and kubernetes'
         raise UsageError(message)
     if form != 'systemd' and is_of_user is not None:
         message = '--user and --system are for systemd'
         raise UsageError(message)
     paths, arguments = split_words(words)
+    if form == ANSIBLE:
+        from composer.cli.hosts.deploy import export_ansible
+
+        if output is None:
+            message = 'ansible is a folder of files'
+            raise UsageError(message, help='say where: --output DIR')
+        return export_ansible(paths, arguments, set_values, output)
+    from composer.cli.exporting.export import export
+
     return export(
         form,
         paths,

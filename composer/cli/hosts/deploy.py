@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
-import asyncio
-import signal
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from composer import signals
 from composer.application.file_selection import load_given
-from composer.application.output import show_findings
+from composer.application.output import show_findings, wants_colour
 from composer.application.system_reader import list_files
 from composer.checks.checker import check_in_context, create_context
 from composer.checks.placement.hosts_and_workers import find_unplaced
 from composer.diagnostics import has_errors
-from composer.errors import ExitCode
-from composer.export.parts import choose_read
+from composer.errors import ComposerError, ExitCode
+from composer.export.parts import check_words, choose_read
 from composer.expressions.functions import variables_noted
-from composer.hosts.bundle import Bundle, choose_hosts
-from composer.hosts.connection import find_real_address, import_asyncssh
-from composer.hosts.deployment import Deployment
-from composer.hosts.host_plan import render_plan
+from composer.hosts.ansible_runs import (
+    UnreachableError,
+    ask_hosts,
+    check_ansible,
+    exit_code_of,
+    run_playbook,
+)
+from composer.hosts.bundle import PLAYBOOKS, Bundle, choose_hosts, write_playbooks
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.network.addresses import is_loopback
 from composer.network.servers import list_sought, used_hosts
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Sequence
-    from pathlib import Path
+    from collections.abc import Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import HostSpec, SystemSpec
@@ -41,10 +44,10 @@ def deploy(
     words: Sequence[str],
     set_values: Sequence[str],
     hosts: Sequence[str],
-    leave: Sequence[str] = (),
     *,
     only_plans: bool,
     removes: bool,
+    rollback_sec: float,
 ) -> int:
     """Bring a system to its hosts; return the exit code.
 
@@ -53,52 +56,78 @@ def deploy(
         words: Values for the arguments that the file declares.
         set_values: Values to change.
         hosts: The names of those to change; empty for all.
-        leave: The names of hosts without anything to run that are left as they are.
         only_plans: Whether to show what would be done only.
         removes: Whether to remove the system.
+        rollback_sec: After how long without a further step a host goes back.
 
     Raises:
-        ComposerError: It could not be done, and everything is as it was.
+        ComposerError: Nothing was done.
     """
-    import_asyncssh()
+    check_ansible()
     with variables_noted() as names:
-        context = _read(paths, words, set_values, needs_hosts=not removes)
+        context = read_deployed(paths, words, set_values, needs_hosts=not removes)
     if context is None:
         return ExitCode.FAILED
     chosen = choose_hosts(context.spec, hosts)
-    if removes:
-        return _run(_remove(context.spec, chosen, hosts, leave))
-    addresses = find_addresses(context.spec)
-    looked_for = [f'hosts.{name}.address={address}' for name, address in addresses.items()]
-    settings = [f'--set={each}' for each in (*set_values, *looked_for)]
-    read = choose_read(names)
-    bundle = Bundle(context, paths, list_files(context), [*words, *settings], read, addresses)
-    return _run(_deploy(context.spec, chosen, hosts, leave, bundle, only_plans=only_plans))
+    with signals.interrupting(), tempfile.TemporaryDirectory(prefix='composer-deploy-') as name:
+        folder = Path(name)
+        write_playbooks(folder, context.spec, chosen)
+        options = [f'--extra-vars=composer_rollback_sec={rollback_sec:g}']
+        playbook = PLAYBOOKS[removes]
+        if not removes:
+            bundle = create_bundle(context, paths, words, set_values, choose_read(names))
+            try:
+                targets = ask_hosts(folder, chosen)
+            except UnreachableError as error:
+                click.echo(f'error: {escape(str(error))}\n  help: {error.help}', err=True)
+                return ExitCode.UNREACHABLE
+            bundle.write(folder, chosen, targets)
+            options += ['--check', '--diff'] * only_plans
+        return _run(context.spec.name, folder, playbook, options, rollback_sec)
 
 
-def _run(work: Coroutine[Any, Any, None]) -> int:
-    """Do something on hosts; return the exit code. After a signal, what was done is taken back."""
-    received: list[int] = []
+def _run(
+    system: str, folder: Path, playbook: str, options: Sequence[str], rollback_sec: float
+) -> int:
+    would = 'would be ' * ('--check' in options)
+    try:
+        outcome = run_playbook(folder, playbook, options, click.echo, colour=wants_colour())
+    except KeyboardInterrupt:
+        _tell(f'interrupted: each host that has changed goes back within {rollback_sec:g} s')
+        raise
+    for host, state in outcome.states.items():
+        _tell(f'{host}: {would if state == "changed" else ""}{state}')
+    code = exit_code_of(outcome)
+    if code:
+        lost = [host for host, state in outcome.states.items() if state == 'unreachable']
+        back = f'; {", ".join(lost)}, if it has, does so within {rollback_sec:g} s' if lost else ''
+        _tell(f"error: '{system}' was not deployed: all that had changed went back{back}")
+    else:
+        count = sum(state == 'changed' for state in outcome.states.values())
+        hosts = '1 host' if count == 1 else f'{count} hosts'
+        _tell(f'{system}: {hosts} {would}changed' if count else f'{system}: nothing to do')
+    return code
 
-    async def run() -> None:
-        task = asyncio.ensure_future(work)
-        loop = asyncio.get_running_loop()
 
-        def stop(number: int) -> None:
-            received.append(number)
-            task.cancel()
+def export_ansible(
+    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], output: Path
+) -> int:
+    """Write what brings a system to hosts that are as this computer; return the exit code.
 
-        for number in signals.HANDLED:
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                loop.add_signal_handler(number, stop, number)
-        with suppress(asyncio.CancelledError):
-            await task
+    Raises:
+        ComposerError: A file is there that was edited, or a package is not here.
+    """
+    with variables_noted() as names:
+        context = read_deployed(paths, words, set_values, needs_hosts=True)
+    if context is None:
+        return ExitCode.FAILED
+    bundle = create_bundle(context, paths, words, set_values, choose_read(names))
+    for path in bundle.write(output, choose_hosts(context.spec)):
+        _tell(f'wrote {path}')
+    return ExitCode.DONE
 
-    asyncio.run(run())
-    return 128 + received[0] if received else ExitCode.DONE
 
-
-def _read(
+def read_deployed(
     paths: Sequence[Path],
     words: Sequence[str],
     set_values: Sequence[str],
@@ -118,15 +147,33 @@ def _read(
     return None if has_errors(findings) else context
 
 
+def create_bundle(
+    context: CheckContext,
+    paths: Sequence[Path],
+    words: Sequence[str],
+    set_values: Sequence[str],
+    read: dict[str, bool],
+) -> Bundle:
+    """Return what the hosts of a system are brought.
+
+    Raises:
+        ComposerError: The value of a variable stands on the command line.
+    """
+    given = [*words, *(f'--set={value}' for value in set_values)]
+    check_words(given, read)
+    addresses = find_addresses(context.spec)
+    return Bundle(context, paths, list_files(context), given, read, addresses)
+
+
 def find_addresses(spec: SystemSpec) -> dict[str, str]:
     """Return the addresses by which hosts find each other, by name, where ssh has others.
 
     Raises:
         ComposerError: The configuration of ssh cannot be read.
     """
-    found = {}
+    addresses = {}
     for host in list_sought(spec, used_hosts(spec)):
-        address = find_real_address(host)
+        address = _find_real_address(host)
         if address == host.address:
             continue
         known = f"host {host.name}: '{host.address}' is {address} for ssh here (HostName)"
@@ -134,51 +181,28 @@ def find_addresses(spec: SystemSpec) -> dict[str, str]:
             _tell(f"warning: {known}: all hosts must know it as '{host.address}'")
         else:
             _tell(f'{known}: the hosts find each other by that')
-            found[host.name] = address
-    return found
+            addresses[host.name] = address
+    return addresses
 
 
-async def _deploy(
-    spec: SystemSpec,
-    hosts: Sequence[HostSpec],
-    wanted: Sequence[str],
-    leave: Sequence[str],
-    bundle: Bundle,
-    *,
-    only_plans: bool,
-) -> None:
-    system = spec.name
-    async with Deployment(system, hosts, _tell) as deployment:
-        if not only_plans:
-            await deployment.lock()
-        facts = await deployment.look()
-        deployment.check_variables(bundle.needed_variables)
-        if not only_plans:
-            await deployment.repair()
-        await deployment.find_left(spec.hosts, wanted, leave, locks=not only_plans)
-        plans = deployment.plan(bundle.build(hosts, facts))
-        for each in plans:
-            click.echo('\n'.join(map(escape, render_plan(each))))
-        if only_plans:
-            return
-        deployment.check(plans)
-        await deployment.apply(plans)
-    busy = sum(each.action != 'nothing' for each in plans)
-    _tell(f'{system}: {_count(busy)} changed' if busy else f'{system}: nothing to change')
-
-
-async def _remove(
-    spec: SystemSpec, hosts: Sequence[HostSpec], wanted: Sequence[str], leave: Sequence[str]
-) -> None:
-    async with Deployment(spec.name, hosts, _tell) as deployment:
-        await deployment.lock()
-        await deployment.look()
-        await deployment.find_left(spec.hosts, wanted, leave, locks=True)
-        await deployment.remove()
-
-
-def _count(hosts: int) -> str:
-    return f'{hosts} host' if hosts == 1 else f'{hosts} hosts'
+def _find_real_address(host: HostSpec) -> str:
+    """Return the `HostName` that the configuration of ssh has for the address of a host."""
+    try:
+        done = subprocess.run(  # noqa: S603 - ssh itself reads its configuration
+            ['ssh', '-G', '--', host.address],  # noqa: S607 - that of the PATH, as Ansible runs it
+            check=False,
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+        )
+    except FileNotFoundError as error:
+        message = 'hosts are reached by ssh, which is not installed'
+        raise ComposerError(message, help='install openssh-client') from error
+    if done.returncode:
+        message = f'host {host.name} ({host.address}): {done.stderr.strip()}'
+        raise ComposerError(message, help='see ~/.ssh/config')
+    options = dict(line.partition(' ')[::2] for line in done.stdout.splitlines())
+    return options.get('hostname') or host.address
 
 
 def _tell(line: str) -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.cli.common.argument_types import takes_format, takes_settings
-from composer.cli.running.asked_system import AskedSystem
+from composer.cli.common.argument_types import takes_format
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
+from composer.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,51 +29,35 @@ _timeout = click.option(
 )
 
 
-def _takes_asked(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the name of a system to a command, or its files with what they are read with."""
+def _takes_name(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the name of a system (`name`) to a command."""
 
-    @click.argument('words', nargs=-1, metavar='[SYSTEM | FILE [LAYER]... [NAME:=VALUE]...]')
-    @takes_settings
-    @click.option(
-        '--host',
-        'hosts',
-        multiple=True,
-        metavar='NAME',
-        help='Of a FILE, only this host. Can be repeated.',
-    )
+    @click.argument('name', metavar='[SYSTEM]', required=False)
     @wraps(command)
-    def run(
-        *,
-        words: tuple[str, ...],
-        set_values: tuple[str, ...],
-        hosts: tuple[str, ...],
-        **options: object,
-    ) -> int:
-        return command(AskedSystem(words, set_values, hosts), **options)
+    def run(*, name: str | None, **options: object) -> int:
+        if name is not None and name.endswith(('.yaml', '.yml')):
+            message = f"'{name}' is a file, and a running system is asked by its name"
+            raise UsageError(message, help=f"name it: '{Path(name).name.partition('.')[0]}'")
+        return command(name, **options)
 
     return run
 
 
 @click.command('ps')
-@_takes_asked
+@_takes_name
 @takes_format()
-def ps_command(asked: AskedSystem, format_name: str) -> int:
+def ps_command(name: str | None, format_name: str) -> int:
     """List the systems that run on this ROS graph, or SYSTEM alone.
 
-    Of a FILE that declares hosts, its parts are listed: each host is asked over SSH.
     If there is no such system, or it or one of its parts does not answer, the exit code is 1.
     """
-    if asked.are_files:
-        from composer.cli.hosts.across import ps_across
-
-        return ps_across(asked, format_name=format_name)
     from composer.cli.running.ps import list_running
 
-    return list_running(asked.name, format_name=format_name)
+    return list_running(name, format_name=format_name)
 
 
 @click.command('top')
-@_takes_asked
+@_takes_name
 @click.option('--once', is_flag=True, help='Print the table once.')
 @takes_format()
 @click.option(
@@ -91,37 +75,30 @@ def ps_command(asked: AskedSystem, format_name: str) -> int:
     show_default=True,
     help='What a row is.',
 )
-# For a screen that shows several hosts.
-@click.option('--each-period', is_flag=True, hidden=True)
 def top_command(
-    asked: AskedSystem,
+    name: str | None,
     format_name: str,
     sort: str,
     text: str,
     by: str,
     *,
     once: bool,
-    each_period: bool,
 ) -> int:
     """Show the health of each entity, or of each node, of SYSTEM.
 
     Calls in a second, callback times, the share of a processor, messages that wait in the queue;
     and since the start dropped messages, late ticks and errors. SYSTEM is its name; if only one
-    runs, it need not be named; of a FILE that declares hosts, all of these are asked.
+    runs, it need not be named.
     Where the output is no terminal that can draw, and as JSON, it is printed once.
     """
     view = View(sort=sort, text=text, by=by)
-    if asked.are_files:
-        from composer.cli.hosts.across import top_across
-
-        return top_across(asked, view, once=once, format_name=format_name)
     from composer.cli.running.top import top
 
-    return top(asked.name, view, once=once, format_name=format_name, each_period=each_period)
+    return top(name, view, once=once, format_name=format_name)
 
 
 @click.command('reload')
-@_takes_asked
+@_takes_name
 @_timeout
 @click.option(
     '--now',
@@ -129,20 +106,15 @@ def top_command(
     is_flag=True,
     help='Abort goals in flight of actions that go, which it waits for otherwise.',
 )
-def reload_command(asked: AskedSystem, timeout_sec: float, *, aborts_goals: bool) -> int:
+def reload_command(name: str | None, timeout_sec: float, *, aborts_goals: bool) -> int:
     """Let SYSTEM read its files again, and become what they say.
 
     SYSTEM is its name, that of its file without the ending; if only one runs, it need not be
-    named; of a FILE that declares hosts, all of these are told. If the files have errors, it runs
-    on as it was.
+    named. If the files have errors, it runs on as it was.
     """
-    if asked.are_files:
-        from composer.cli.hosts.across import reload_across
-
-        return reload_across(asked, timeout_sec, aborts_goals=aborts_goals)
     from composer.cli.running.commanding import reload
 
-    return reload(asked.name, timeout_sec, aborts_goals=aborts_goals)
+    return reload(name, timeout_sec, aborts_goals=aborts_goals)
 
 
 @click.command('restart')
@@ -160,39 +132,30 @@ def restart_command(node: str, timeout_sec: float) -> int:
 
 
 @click.command('down')
-@_takes_asked
+@_takes_name
 @_timeout
-def down_command(asked: AskedSystem, timeout_sec: float) -> int:
+def down_command(name: str | None, timeout_sec: float) -> int:
     """Stop SYSTEM, and wait until it has stopped.
 
-    SYSTEM is its name; if only one runs, it need not be named. A FILE that declares hosts is
-    stopped on all of them, until they boot or are deployed to.
+    SYSTEM is its name; if only one runs, it need not be named.
     """
-    if asked.are_files:
-        from composer.cli.hosts.across import down_across
-
-        return down_across(asked, timeout_sec)
     from composer.cli.running.commanding import down
 
-    return down(asked.name, timeout_sec)
+    return down(name, timeout_sec)
 
 
 @click.command('logs')
-@_takes_asked
+@_takes_name
 @click.option('--follow', '-f', 'follows', is_flag=True, help='Go on until the system ends.')
-def logs_command(asked: AskedSystem, *, follows: bool) -> int:
+def logs_command(name: str | None, *, follows: bool) -> int:
     """Print what SYSTEM on this host has said.
 
     It must write to a file, as 'composer up --detach' does. Of one that has ended, the last log is
-    printed. Of a FILE that declares hosts, their logs are printed, each line with its host.
+    printed.
     """
-    if asked.are_files:
-        from composer.cli.hosts.across import logs_across
-
-        return logs_across(asked, follows=follows)
     from composer.cli.running.log_files import show_logs
 
-    return show_logs(asked.name, follows=follows)
+    return show_logs(name, follows=follows)
 
 
 @click.command('capture')

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.application.running_systems.client import STATUS_SEC, Client
+from composer.application.running_systems.client import Client
 from composer.application.running_systems.discovery import Discovery
 from composer.application.running_systems.health import (
-    POLL_SEC,
     Poller,
-    read_health,
     wait_for_health,
 )
 from composer.cli.running.top_table import (
@@ -26,18 +23,12 @@ from composer.cli.running.top_table import (
 )
 from composer.errors import ExitCode
 from composer.runtime.control import protocol
-from composer.terminal import is_output_unread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from composer.cli.running.top_table import View
-    from composer.runtime.health.system_state import Outcome
 
 
-def top(
-    name: str | None, view: View, *, once: bool, format_name: str, each_period: bool = False
-) -> int:
+def top(name: str | None, view: View, *, once: bool, format_name: str) -> int:
     """Show the health of each entity; return the exit code.
 
     Args:
@@ -45,18 +36,15 @@ def top(
         view: What to show first.
         once: Whether to print it once. So it is where there is no screen.
         format_name: `text` or `json`; JSON is printed once.
-        each_period: Whether to print a line of JSON in each period, until nobody reads it.
 
     Raises:
         ComposerError: There is no such system, it measures nothing, or it ended.
     """
-    if not (each_period or once or format_name == 'json') and has_screen():
+    if not (once or format_name == 'json') and has_screen():
         return _watch(name, view)
     with Client() as client:
         system = Discovery(client).find(name)
         with client.asking(system, protocol.TOP) as ask:
-            if each_period:
-                return _print_each(ask)
             document = wait_for_health(ask)
             print_health(document, view, format_name)
             return ExitCode.DONE
@@ -81,17 +69,6 @@ def print_health(document: dict[str, Any], view: View, format_name: str) -> None
         lines = map(describe_worst, find_worst(document))
         processes = list_processes(document)
         click.echo('\n'.join([*render_entities(entities), *lines, *processes]))
-
-
-def _print_each(ask: Callable[[float], Outcome]) -> int:
-    printed = None
-    while not is_output_unread():
-        document = read_health(ask(STATUS_SEC))
-        if document['period'] != printed:
-            click.echo(json.dumps(document))
-            printed = document['period']
-        time.sleep(max(POLL_SEC, document['period_sec'] / 2))
-    return ExitCode.DONE
 
 
 def _watch(name: str | None, view: View) -> int:

@@ -72,8 +72,6 @@ COLUMNS = (
 )
 # Only of systems with workers; an empty one is the process of the system.
 _WORKER = Column('WORKER', lambda entity: escape(entity['worker']) or None, str, 8, 6)
-# Only of several hosts.
-_HOST = Column('HOST', lambda entity: escape(entity.get('host', '')) or None, str, 1, 6)
 SORT_NAMES = {
     **{each.title.lower().partition(' ')[0].partition('/')[0]: each for each in COLUMNS},
 }
@@ -82,7 +80,7 @@ DEFAULT_SORT = 'cpu'
 # Narrower cells are cut as a whole, not node and entity each.
 _SPLIT = 8
 _READABLE, _READABLE_RANK, _LAST_RANK = 48, 9, 13
-_OF_NODE = ('host', 'worker', 'node', 'level', 'message')
+_OF_NODE = ('worker', 'node', 'level', 'message')
 _COUNTS = ('calls', 'errors', 'dropped', 'late', 'skipped')
 _SEVERITIES = {'warn': 1, 'error': 2}
 # A callback that computes keeps others waiting for a millisecond, the executor's switch interval.
@@ -124,9 +122,9 @@ def sum_nodes(entities: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
     The rate is that of calls: messages that publishers and clients send are not among them.
     """
-    nodes: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    nodes: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for entity in entities:
-        nodes.setdefault((*_place(entity), entity['node']), []).append(entity)
+        nodes.setdefault((entity['worker'], entity['node']), []).append(entity)
     return [_sum_node(own) for own in nodes.values()]
 
 
@@ -159,19 +157,14 @@ def find_worst(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return which entities used most of a core while others waited for the interpreter (GIL).
 
     Returns:
-        One at most for each process: `host` if there are several, `worker`, `node`, `entity`,
-        its share of a core `cpu`, and how long the others waited, `wait_mean_ms` and
-        `wait_max_ms`.
+        One at most for each process: `worker`, `node`, `entity`, its share of a core `cpu`, and
+        how long the others waited, `wait_mean_ms` and `wait_max_ms`.
     """
     return [worst for each in document['processes'] if (worst := _worst_of(document, each))]
 
 
-def _place(each: Mapping[str, Any]) -> tuple[str, str]:
-    return each.get('host', ''), each['worker']
-
-
 def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[str, Any] | None:
-    mates = [each for each in document['entities'] if _place(each) == _place(process)]
+    mates = [each for each in document['entities'] if each['worker'] == process['worker']]
     known = [each for each in mates if each['cpu'] is not None]
     worst = max(known, key=lambda each: float(each['cpu']), default=None)
     if worst is None or worst['cpu'] < _BUSY:
@@ -179,9 +172,7 @@ def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[s
     has_others = any(each['node'] != worst['node'] and each['calls'] for each in mates)
     if not has_others or (process['gil_wait_mean_ms'] or 0.0) < _WAITED_MS:
         return None
-    where = {'host': worst['host']} if 'host' in worst else {}
     return {
-        **where,
         'worker': worst['worker'],
         'node': worst['node'],
         'entity': _describe(worst).removeprefix(f'{worst["node"]}: '),
@@ -194,7 +185,6 @@ def _worst_of(document: Mapping[str, Any], process: Mapping[str, Any]) -> dict[s
 def describe_worst(worst: Mapping[str, Any]) -> str:
     """Return a line about one that `find_worst` returned."""
     where = f' in worker {worst["worker"]}' if worst['worker'] else ''
-    where += f' on host {worst["host"]}' if 'host' in worst else ''
     return escape(
         f'{worst["node"]}: {worst["entity"]}{where} uses {worst["cpu"]:.0%} of a core: other '
         f'callbacks wait {worst["wait_mean_ms"]:.1f} ms for the interpreter (GIL) on average, '
@@ -203,12 +193,9 @@ def describe_worst(worst: Mapping[str, Any]) -> str:
 
 
 def list_processes(document: Mapping[str, Any]) -> list[str]:
-    """Return the lines of the table of external processes, with the hosts if there are several."""
+    """Return the lines of the table of external processes."""
     name = document['name'].partition('@')[0]
-    return render_processes(
-        (f'{name}@{each["host"]}' if 'host' in each else name, each)
-        for each in document['external_processes']
-    )
+    return render_processes((name, process) for process in document['external_processes'])
 
 
 def render_entities(
@@ -221,9 +208,8 @@ def render_entities(
         width: The longest that a line may be, for which names are shortened and columns left out.
     """
     has_workers = any(each['worker'] for each in entities)
-    has_hosts = any(each.get('host') for each in entities)
     entity, *figures = COLUMNS
-    columns = (entity, *(_HOST,) * has_hosts, *figures, *(_WORKER,) * has_workers)
+    columns = (entity, *figures, *(_WORKER,) * has_workers)
     cells = {
         each: [
             each.title,

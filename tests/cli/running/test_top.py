@@ -11,7 +11,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.cli.hosts.top_hosts import merge_health
 from composer.cli.main import run
 from composer.cli.running.top_table import (
     SORT_NAMES,
@@ -205,24 +204,6 @@ def test_names_that_differ_in_their_middle_are_told_apart_if_there_is_room(width
 def process(worker='', **figures):
     waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, **waits, **figures}
-
-
-def test_hosts_have_workers_of_the_same_name_and_a_column():
-    none = {'external_processes': []}
-    told = {
-        'base': {'processes': [process()], 'entities': ENTITIES[:1], **none},
-        'jetson': {'processes': [process()], 'entities': ENTITIES[1:], **none},
-    }
-    document = merge_health(told)
-    lines = render_entities(document['entities'])
-    assert lines[0].split()[:3] == ['ENTITY', 'HOST', 'RATE/S']
-    assert [line.split()[3] for line in lines[1:]] == ['base', 'jetson', 'jetson']
-    # The node that waits for the interpreter is on another host.
-    assert find_worst(document) == []
-    rear = {'processes': [process()], 'entities': ENTITIES, **none}
-    both = merge_health({**told, 'rear': rear})
-    (worst,) = find_worst(both)
-    assert ' on host rear uses 75% of a core' in describe_worst(worst)
 
 
 def test_the_entity_is_named_that_keeps_the_interpreter_from_others():
