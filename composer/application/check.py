@@ -68,7 +68,6 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
 
     Raises:
         UsageError: Arguments or `--set` do not fit the file, or are given together with a matrix.
-        ComposerError: The type checker does not work.
     """
     catalogue = InterfaceCatalogue()
     selection = _select(words, options)

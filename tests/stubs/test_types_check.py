@@ -113,6 +113,13 @@ def test_a_line_says_what_was_not_checked_or_by_an_untested_version(typed, monke
     monkeypatch.setattr('composer.stubs.checking.kept_types.TESTED_VERSION', '0.0.1')
     cli.run(['check', 'system.yaml'])
     assert f'pyrefly {type_checker.TESTED_VERSION} is untested' in capsys.readouterr().err
+    broken = typed / 'pyrefly'
+    broken.write_text('#!/bin/sh\necho no such symbol >&2\nexit 127\n')
+    broken.chmod(0o755)
+    monkeypatch.setattr('composer.application.check.find_program', lambda: broken)
+    cli.run(['check', 'system.yaml'])
+    message = '(pyrefly does not work: no such symbol)'
+    assert f'not checked: the types of behaviours {message}' in capsys.readouterr().err
     monkeypatch.setattr('composer.application.check.find_program', lambda: None)
     cli.run(['check', 'system.yaml'])
     assert 'not checked without pyrefly: the types of behaviours' in capsys.readouterr().err

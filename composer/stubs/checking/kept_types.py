@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
-from composer.stubs.checking.type_checker import TESTED_VERSION, keep_result, load_result
+from composer.stubs.checking.type_checker import (
+    TESTED_VERSION,
+    TypeCheckerError,
+    keep_result,
+    load_result,
+)
 from composer.stubs.project_modules import all_nodes, find_project_modules
 
 if TYPE_CHECKING:
@@ -28,18 +33,16 @@ class TypesCheck:
         program: Pyrefly; `None` if it is not installed.
         was_needed: Whether a system has behaviours in the project.
         versions: The versions of pyrefly that checked one.
+        failure: Why pyrefly does not work.
     """
 
     program: Path | None
     was_needed: bool = False
     versions: set[str] = field(default_factory=set)
+    failure: str = ''
 
     def __call__(self, context: CheckContext, found: list[Diagnostic]) -> list[Diagnostic]:
-        """Return what is wrong where the other checks found nothing.
-
-        Raises:
-            TypeCheckerError: Pyrefly does not work.
-        """
+        """Return what is wrong where the other checks found nothing."""
         modules = find_project_modules(context)
         self.was_needed |= bool(modules)
         if not modules or self.program is None:
@@ -53,7 +56,11 @@ class TypesCheck:
         # To import it takes longer than all the rest here.
         from composer.stubs.checking.types_check import find_type_errors
 
-        findings, result = find_type_errors(self.program, context, modules, kept, found)
+        try:
+            findings, result = find_type_errors(self.program, context, modules, kept, found)
+        except TypeCheckerError as error:
+            self.failure = str(error)
+            return []
         self.versions.add(result.version)
         if result != kept:
             keep_result(digest, result)
@@ -65,6 +72,8 @@ class TypesCheck:
         if self.was_needed and self.program is None:
             advice = "pip install 'rclpy-composer[types]'"
             return f'not checked without pyrefly: the types of behaviours ({advice})'
+        if self.failure:
+            return f'not checked: the types of behaviours ({self.failure})'
         untested = ', '.join(sorted(self.versions - {TESTED_VERSION}))
         if untested:
             return f'pyrefly {untested} is untested: Composer reads what {TESTED_VERSION} prints'

@@ -122,14 +122,14 @@ def run_type_checker(
         for path, text in files.items():
             place = folder / path
             place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_text(text, encoding='utf-8')
+            place.write_text(text, encoding='utf-8', errors='replace')
         text = _run(
             program, ['check', *_OPTIONS, '--relative-to', str(folder / 'modules')], folder
         )
     try:
         reports = json.loads(text)['errors']
     except (ValueError, KeyError) as error:
-        message = f'pyrefly does not work: it printed {text.strip()[-500:]!r}'
+        message = f'pyrefly does not work: it printed {text.strip()[-200:]!r}'
         raise TypeCheckerError(message) from error
     keys = ('path', 'line', 'column', 'name', 'description')
     return TypeResult(
@@ -184,6 +184,7 @@ def _run(program: Path, arguments: list[str], folder: Path | None = None) -> str
         message = f'pyrefly does not work: {error}'
         raise TypeCheckerError(message) from error
     if done.returncode not in (0, 1):
-        message = f'pyrefly does not work: {(done.stderr or done.stdout).strip()[-500:]}'
+        said = (done.stderr or done.stdout).strip().rpartition('\n')[2]
+        message = f'pyrefly does not work: {said[-200:]}'
         raise TypeCheckerError(message)
     return done.stdout
