@@ -40,6 +40,18 @@ def list_project_files(spec: SystemSpec, named: Iterable[Path]) -> list[Path]:
     ]
 
 
+def check_not_installed(given: Iterable[Path]) -> None:
+    """Check that no file of a command line is in an installed package.
+
+    Raises:
+        ComposerError: One is: containers and other hosts would lack it.
+    """
+    for path in map(Path.absolute, given):
+        if any(path.is_relative_to(prefix.absolute()) for prefix in ament_prefixes()):
+            message = f'{path} is a file of an installed package, which is not brought along'
+            raise ComposerError(message, help='name the file in the source of the package instead')
+
+
 def find_root(files: Iterable[Path]) -> Path:
     """Return the folder of the project that files are in: that of all of them, if there are more.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.confidential import list_lineage
-from composer.export.project import list_project_files
+from composer.export.project import check_not_installed, list_project_files
 from composer.hosts.wheels import read_folder
 from composer.python_source.module_finder import MissingModule
 from composer.records import record
@@ -52,7 +52,11 @@ def collect_files(given: Sequence[Path], named: Iterable[Path], spec: SystemSpec
     Args:
         given: The file and its layers.
         named: What else it is read from, but for modules; what is installed is left out.
+
+    Raises:
+        ComposerError: A given file is in an installed package.
     """
+    check_not_installed(given)
     installed = [Path(sys.prefix), Path(sys.base_prefix)]
     found = list_project_files(spec, [*given, *named])
     paths = [path for path in found if not any(map(path.is_relative_to, installed))]

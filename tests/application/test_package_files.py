@@ -127,6 +127,8 @@ def test_all_commands_take_a_package(share, capsys):
         assert run([command, 'arm', 'arm.yaml']) == 0, command
         assert 'elbow' in capsys.readouterr().out or command == 'check'
     assert run(['plan', 'arm', 'arm.yaml', 'arm', 'arm.yaml']) == 0
+    assert run(['export', 'compose', 'arm', 'arm.yaml']) == 1
+    assert 'is a file of an installed package' in capsys.readouterr().err
     assert run(['up', 'arm']) == 2
     assert f'{share}/systems/arm.yaml' in capsys.readouterr().err
 

@@ -26,7 +26,7 @@ from composer.export.parts import (
     list_hosts,
     list_parts,
 )
-from composer.export.project import find_root, list_project_files
+from composer.export.project import check_not_installed, find_root, list_project_files
 from composer.export.written_files import mark, write_files
 from composer.expressions.functions import variables_noted
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -116,6 +116,8 @@ def _describe(  # noqa: PLR0913 - as above
     named = [path.absolute() for path in (*paths, *list_files(context))]
     files = list_project_files(spec, named)
     stays_here, folder = form == _STAYS_HERE, Path.cwd()
+    if not stays_here:
+        check_not_installed(paths)
     # A program of a process that lies elsewhere is no reason to mount the folder of both.
     root = Path('/') if stays_here else find_root(set(named).intersection(files) or files)
     files = [path for path in files if path.is_relative_to(root)]
