@@ -80,8 +80,10 @@ def _find_pair(package: str, file: str, *, is_first: bool) -> str | None:
     is_pair = _NAME.fullmatch(package) and _FILE.match(file)
     if not is_pair or ':=' in file or file.startswith('/') or os.path.isfile(package):
         return None
-    share = find_share(package)
     name = file.partition('::')[0]
+    if os.path.exists(package) and os.path.exists(name):
+        return None
+    share = find_share(package)
     for inside in (f'{_SYSTEMS}/{name}', name):
         if share and os.path.isfile(share / inside):
             return _resolve(f'package://{package}/{inside}{file.removeprefix(name)}')

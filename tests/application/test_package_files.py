@@ -27,7 +27,13 @@ def share(tmp_path, monkeypatch):
     (prefix / PACKAGE_INDEX).mkdir(parents=True)
     (prefix / PACKAGE_INDEX / 'arm').touch()
     (prefix / PACKAGE_INDEX / 'without').touch()
+    # A folder in the working folder has the name of this one.
+    (prefix / PACKAGE_INDEX / 'both').touch()
+    (share.with_name('both') / 'systems').mkdir(parents=True)
+    for name in ('extra.yaml', 'systems/local.yaml'):
+        (share.with_name('both') / name).write_text(SYSTEM)
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    (tmp_path / 'here' / 'both').mkdir(parents=True)
     (tmp_path / 'here' / 'folder').mkdir(parents=True)
     monkeypatch.chdir(tmp_path / 'here')
     Path('local.yaml').write_text(SYSTEM)
@@ -56,6 +62,8 @@ def share(tmp_path, monkeypatch):
         ('local.yaml arm other.yaml', 'local.yaml arm other.yaml'),
         # What is here is meant.
         ('folder local.yaml', 'folder local.yaml'),
+        ('both local.yaml', 'both local.yaml'),
+        ('both extra.yaml', '@/../both/extra.yaml'),
         ('arm local.yaml', '@/systems local.yaml'),
         ('nothing local.yaml', 'nothing local.yaml'),
         ('without', 'without'),
@@ -65,7 +73,8 @@ def share(tmp_path, monkeypatch):
 )
 def test_packages_are_found_and_all_else_is_left_alone(share, words, expected):
     given = words.split(' ') if words else []
-    assert ' '.join(resolve_words(given)) == expected.replace('@', str(share))
+    wanted = expected.replace('@/..', str(share.parent)).replace('@', str(share))
+    assert ' '.join(resolve_words(given)) == wanted
 
 
 @pytest.mark.parametrize(
