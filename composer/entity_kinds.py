@@ -56,8 +56,8 @@ class EntityKind:
         has_qos: Whether it has the key `qos`.
         publishes: Whether it has the key `publish`, for what its behaviour returns.
         has_group: Whether it has the key `group`; the behaviours of others run in no group.
-        is_timed: Whether a timer calls its behaviour; what creates it returns something with
-            rclpy's `reset` and `cancel`.
+        is_timed: Whether its behaviour is called by itself, as by a timer; what creates it returns
+            something with rclpy's `reset` and `cancel`.
         missed: What it can miss if callbacks take too long, as attributes of
             `MissedCounts`, by their names in diagnostics.
         behaviours: The keys that name its behaviours.
@@ -148,6 +148,19 @@ ENTITY_KINDS: tuple[EntityKind, ...] = (
             ),
         ),
         stand_in={'period': 1.0, 'behaviour': _BEHAVIOUR},
+    ),
+    EntityKind(
+        'sources',
+        'source',
+        publishes=True,
+        is_timed=True,
+        behaviours=(
+            BehaviourKey(
+                'behaviour', ('node',), returned=PUBLISHED, yielded=PUBLISHED, may_yield=True
+            ),
+            BehaviourKey('cancel', ('node',)),
+        ),
+        stand_in={'behaviour': _BEHAVIOUR},
     ),
     EntityKind(
         'services',

@@ -136,3 +136,9 @@ def test_logging_shows_the_levels_that_are_asked_for(up, arguments, first):
     assert child.stop() == 0
     expected = [f'[{level}] [logger_node]: {text}' for level, text in _LEVELS.items()]
     assert child.matching('[logger_node]: This is') == expected[first:]
+
+
+def test_a_source_publishes_the_lines_of_a_port(up):
+    child = up('serial_line')
+    child.wait_for_line('I heard: "$GPGLL,4916.45,N,12311.12,W"')
+    assert child.stop() == 0, child.output

@@ -40,7 +40,7 @@ def test_an_entity_has_the_keys_that_its_kind_has(kind):
     assert ('publish' in keys) == kind.publishes
     assert ('group' in keys) == kind.has_group
     events = {key for key in keys if key.startswith('on_') and key != 'on_error'}
-    behaviours = events | (keys & {'behaviour', 'accept', 'feedback', 'result'})
+    behaviours = events | (keys & {'behaviour', 'accept', 'feedback', 'result', 'cancel'})
     assert behaviours == {each.key for each in kind.behaviours}
     assert ('external' in keys) == (kind.unmatched is not None)
 

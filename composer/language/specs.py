@@ -201,6 +201,23 @@ class TimerSpec:
 
 
 @record
+class SourceSpec:
+    """A source: something that blocks, called again and again in a thread of its own.
+
+    Attributes:
+        cancel: Called when it is to end, to end the wait of its behaviour.
+    """
+
+    name: str
+    behaviour: BehaviourSpec
+    cancel: BehaviourSpec | None
+    publish: str | None
+    on_error: OnError
+    warn_after_sec: float | None
+    path: DataPath
+
+
+@record
 class ServiceSpec:
     """A service that the node serves.
 
@@ -587,6 +604,7 @@ class NodeSpec:
     publishers: Mapping[str, PublisherSpec]
     subscriptions: Mapping[str, SubscriptionSpec]
     timers: Mapping[str, TimerSpec]
+    sources: Mapping[str, SourceSpec]
     services: Mapping[str, ServiceSpec]
     service_clients: Mapping[str, ServiceClientSpec]
     actions: Mapping[str, ActionSpec]

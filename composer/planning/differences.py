@@ -83,6 +83,7 @@ _LOST = {
     'publishers': 'messages not delivered yet',
     'subscriptions': 'messages queued',
     'timers': 'its phase',
+    'sources': 'what it has not read yet',
     'services': 'requests queued',
     'service_clients': 'responses that calls wait for',
     'actions': 'results not fetched yet',
@@ -91,7 +92,7 @@ _LOST = {
 # With another one of these, a subscription has no use for what waits.
 _OTHER_MESSAGES = {'topic', 'type', 'raw', 'content_filter'}
 # One that is recreated keeps it.
-_WITH_OWN_STATE = ('subscriptions', 'timers', 'services', 'actions')
+_WITH_OWN_STATE = ('subscriptions', 'timers', 'sources', 'services', 'actions')
 _ENTITIES = {
     kind.section: _PARAMETERS
     if kind.section == 'parameters'

@@ -22,6 +22,7 @@ from composer.language.specs import (
     PublisherSpec,
     ServiceClientSpec,
     ServiceSpec,
+    SourceSpec,
     SubscriptionSpec,
     TimerSpec,
 )
@@ -144,6 +145,19 @@ def _parse_timer(node: Data, name: str, data: Data, path: DataPath) -> TimerSpec
     )
 
 
+def _parse_source(node: Data, name: str, data: Data, path: DataPath) -> SourceSpec:
+    # It waits by nature: only a limit of its own counts.
+    options = parse_run_options({'warn_after': None} | data, node)
+    return SourceSpec(
+        name=name,
+        behaviour=behaviour_at(data, path),
+        cancel=parse_behaviour(data, path, 'cancel'),
+        publish=data.get('publish'),
+        path=path,
+        **options,
+    )
+
+
 def _parse_service(node: Data, name: str, data: Data, path: DataPath) -> ServiceSpec:
     return ServiceSpec(
         name=name,
@@ -228,6 +242,7 @@ _PARSERS: dict[str, Callable[[Data, str, Any, DataPath], Any]] = {
     'publishers': _parse_publisher,
     'subscriptions': _parse_subscription,
     'timers': _parse_timer,
+    'sources': _parse_source,
     'services': _parse_service,
     'service_clients': _parse_service_client,
     'actions': _parse_action,

@@ -13,6 +13,7 @@ from composer.runtime.entities.parameters import NodeParameters
 from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
 from composer.runtime.entities.services import Service
+from composer.runtime.entities.sources import Source
 from composer.runtime.entities.subscriptions import Subscription
 from composer.runtime.entities.timers import Timer
 
@@ -46,6 +47,7 @@ CREATORS: dict[str, Callable[[LiveNode, Any], LiveEntity]] = {
     'actions': _create_action_server,
     'subscriptions': Subscription,
     'timers': Timer,
+    'sources': Source,
 }
 
 

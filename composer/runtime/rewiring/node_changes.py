@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter
 
+from composer.entity_kinds import KIND_OF_SECTION
 from composer.errors import StartError
 from composer.language.bindings import node_bindings
 from composer.planning.plan import COMING, Action
@@ -122,7 +123,7 @@ class NodeChange:
             node.drop_limits(operation.noun, name)
             created = self._create(operation.target, spec)
             transaction.on_undo(created.destroy)
-            if section == 'timers':
+            if KIND_OF_SECTION[section].is_timed:
                 transaction.on_commit(_start_timer, node, created)
             transaction.on_undo(entities.pop, name, None)
             entities[name] = created

@@ -329,6 +329,10 @@ _OF_DECLARED_NODES = (
     'interface',
 )
 _DECLARED = 'what a process is declared to have changes nothing that runs, as test_plan.py says'
+_OF_SOURCES = (
+    *('foreach', 'when', 'behaviour', 'with', 'publish', 'cancel', 'on_error', 'warn_after'),
+)
+_SOURCES = 'tests/runtime/entities/test_sources.py edits sources'
 _APART = 'tests/runtime/external/test_components.py edits containers, which take long to start'
 _OF_HOSTS = (
     *('description', 'foreach', 'when', 'address', 'user', 'port', 'python', 'identity_file'),
@@ -351,6 +355,8 @@ LEFT_OUT: dict[str, str] = {
     'system.containers': _APART,
     **{f'container.{key}': _APART for key in _OF_CONTAINERS},
     **{f'component.{key}': _APART for key in (*_OF_COMPONENTS, *_OF_DECLARED_NODES)},
+    **{f'source.{key}': _SOURCES for key in _OF_SOURCES},
+    'node.sources': _SOURCES,
     **{f'process.{key}': _DECLARED for key in (*_OF_DECLARED_NODES, 'nodes')},
     **{
         f'declared_node.{key}': _DECLARED
