@@ -9,7 +9,7 @@ from importlib.resources import files as resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.errors import UsageError
+from composer.errors import ComposerError, UsageError
 from composer.export import ANSIBLE
 from composer.export.documents import render_document
 from composer.export.written_files import mark, write_files
@@ -34,9 +34,8 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.language.specs import HostSpec, SystemSpec
 
-GROUP = 'composer'
-PLAYBOOKS = ('deploy.yaml', 'remove.yaml')
-_SETTINGS = 'ansible.cfg'
+PLAYBOOKS = ('deploy.yaml', 'remove.yaml', 'ask.yaml')
+_SETTINGS, _FOLDERS = 'ansible.cfg', ('hosts', 'wheels')
 _KEYS = {
     'address': 'ansible_host',
     'user': 'ansible_user',
@@ -55,8 +54,6 @@ class Bundle:
         named: All files that were read.
         words: The arguments of the command line that come after the files.
         read: The variables of the environment that the files read.
-        addresses: Where hosts look for others, by their names, if not at their addresses: these
-            may be names that only ssh here knows.
     """
 
     def __init__(
@@ -66,15 +63,12 @@ class Bundle:
         named: Iterable[Path],
         words: Sequence[str],
         read: Collection[str],
-        addresses: Mapping[str, str],
     ) -> None:
-        self._context, self._read, self._addresses = context, read, addresses
+        self._context, self._words, self._read = context, words, read
         modules = set(context.modules.list_files())
         others = [path for path in named if path not in modules]
         self._files = collect_files(given, others, context.spec)
         self._given = [os.path.relpath(path, self._files.folder) for path in given]
-        sought = addresses.items()
-        self._words = [*words, *(f'--set=hosts.{name}.address={at}' for name, at in sought)]
 
     def write(
         self,
@@ -90,8 +84,12 @@ class Bundle:
         Raises:
             ComposerError: Something that a host needs is not there, or a file was edited.
         """
+        for name in _FOLDERS:
+            if (folder / name).exists() and not (folder / PLAYBOOKS[0]).exists():
+                message = f"{folder / name} is there, and was not written by 'composer export'"
+                raise ComposerError(message, help='write to another folder')
         paths = write_playbooks(folder, self._context.spec, hosts)
-        for name in ('hosts', 'wheels'):
+        for name in _FOLDERS:
             shutil.rmtree(folder / name, ignore_errors=True)
             (folder / name).mkdir()
         composer = write_composer_wheel(folder / 'wheels')
@@ -108,10 +106,10 @@ class Bundle:
                 if wheel != composer:
                     shutil.copy2(wheel, folder / 'wheels')
             write_part(sources, part)
-        return [*paths, folder / 'hosts', folder / 'wheels']
+        return [*paths, *(folder / name for name in _FOLDERS)]
 
     def _collect(self, host: HostSpec, target: PlatformSpec, composer: Path) -> PartSources:
-        spec = self._with_addresses(self._context.spec.on_host(host.name))
+        spec = self._context.spec.on_host(host.name)
         # A copy asks for the part; what was read stays read.
         snapshot = take_snapshot(replace(self._context, spec=spec))
         required = [
@@ -132,13 +130,6 @@ class Bundle:
             variables=ros_variables(spec),
             read=self._read,
         )
-
-    def _with_addresses(self, spec: SystemSpec) -> SystemSpec:
-        hosts = {
-            name: replace(host, address=self._addresses.get(name, host.address))
-            for name, host in spec.hosts.items()
-        }
-        return replace(spec, hosts=hosts)
 
 
 def write_playbooks(folder: Path, spec: SystemSpec, hosts: Sequence[HostSpec]) -> list[Path]:
@@ -166,7 +157,7 @@ def _describe(spec: SystemSpec, hosts: Sequence[HostSpec]) -> dict[str, Any]:
         }
     # How long a host waits for the next step, before it goes back.
     variables = {'composer_rollback_sec': 90}
-    return {GROUP: {'vars': variables, 'hosts': entries}}
+    return {'composer': {'vars': variables, 'hosts': entries}}
 
 
 def choose_hosts(spec: SystemSpec, wanted: Sequence[str] = ()) -> list[HostSpec]:

@@ -9,6 +9,7 @@ import yaml
 from composer.cli import main as cli
 from composer.cli.hosts.deploy import find_addresses
 from composer.errors import ExitCode
+from composer.hosts.bundle import PLAYBOOKS
 from composer.language.pipeline import load_system
 
 SYSTEM = """\
@@ -81,7 +82,7 @@ def test_each_host_has_its_part(folder, capsys):
 def test_ansible_reads_it_and_edits_are_kept(folder, capsys):
     pytest.importorskip('ansible')
     assert cli.run(['export', 'ansible', 'robot.yaml', '-o', 'out']) == 0
-    for playbook in ('deploy.yaml', 'remove.yaml'):
+    for playbook in PLAYBOOKS:
         words = [sys.executable, '-m', 'ansible', 'playbook', '--syntax-check', playbook]
         subprocess.run(words, cwd=folder / 'out', check=True, capture_output=True)
     # No rescue follows an unreachable host otherwise.
@@ -94,6 +95,10 @@ def test_ansible_reads_it_and_edits_are_kept(folder, capsys):
     capsys.readouterr()
     assert cli.run(['export', 'ansible', 'robot.yaml', '-o', 'out']) == 1
     assert 'deploy.yaml was edited since it was exported' in capsys.readouterr().err
+    # A folder of others is not emptied.
+    (folder / 'hosts').mkdir()
+    assert cli.run(['export', 'ansible', 'robot.yaml', '-o', '.']) == 1
+    assert "hosts is there, and was not written by 'composer export'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

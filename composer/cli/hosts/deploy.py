@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,13 +20,7 @@ from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode
 from composer.export.parts import check_words, choose_read
 from composer.expressions.functions import variables_noted
-from composer.hosts.ansible_runs import (
-    UnreachableError,
-    ask_hosts,
-    check_ansible,
-    exit_code_of,
-    run_playbook,
-)
+from composer.hosts.ansible_runs import Outcome, check_ansible, read_targets, run_playbook
 from composer.hosts.bundle import PLAYBOOKS, Bundle, choose_hosts, write_playbooks
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.network.addresses import is_loopback
@@ -33,7 +28,7 @@ from composer.network.servers import list_sought, used_hosts
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from composer.checks.context import CheckContext
     from composer.language.specs import HostSpec, SystemSpec
@@ -65,7 +60,7 @@ def deploy(
     """
     check_ansible()
     with variables_noted() as names:
-        context = read_deployed(paths, words, set_values, needs_hosts=not removes)
+        context = _read(paths, words, set_values, needs_hosts=not removes)
     if context is None:
         return ExitCode.FAILED
     chosen = choose_hosts(context.spec, hosts)
@@ -75,38 +70,34 @@ def deploy(
         options = [f'--extra-vars=composer_rollback_sec={rollback_sec:g}']
         playbook = PLAYBOOKS[removes]
         if not removes:
-            bundle = create_bundle(context, paths, words, set_values, choose_read(names))
-            try:
-                targets = ask_hosts(folder, chosen)
-            except UnreachableError as error:
-                click.echo(f'error: {escape(str(error))}\n  help: {error.help}', err=True)
-                return ExitCode.UNREACHABLE
-            bundle.write(folder, chosen, targets)
+            bundle = _create_bundle(context, paths, words, set_values, names)
+            outcome = run_playbook(folder, PLAYBOOKS[2], [], click.echo, colour=wants_colour())
+            if outcome.code:
+                _tell(f"error: '{context.spec.name}' was not deployed: nothing was changed")
+                return outcome.code
+            bundle.write(folder, chosen, read_targets(folder, chosen))
             options += ['--check', '--diff'] * only_plans
-        return _run(context.spec.name, folder, playbook, options, rollback_sec)
+        try:
+            outcome = run_playbook(folder, playbook, options, click.echo, colour=wants_colour())
+        except KeyboardInterrupt:
+            _tell(f'interrupted: each host that has changed goes back within {rollback_sec:g} s')
+            raise
+    _summarize(context.spec.name, outcome, rollback_sec, 'would be ' * only_plans)
+    return outcome.code
 
 
-def _run(
-    system: str, folder: Path, playbook: str, options: Sequence[str], rollback_sec: float
-) -> int:
-    would = 'would be ' * ('--check' in options)
-    try:
-        outcome = run_playbook(folder, playbook, options, click.echo, colour=wants_colour())
-    except KeyboardInterrupt:
-        _tell(f'interrupted: each host that has changed goes back within {rollback_sec:g} s')
-        raise
+def _summarize(system: str, outcome: Outcome, rollback_sec: float, would: str) -> None:
     for host, state in outcome.states.items():
         _tell(f'{host}: {would if state == "changed" else ""}{state}')
-    code = exit_code_of(outcome)
-    if code:
-        lost = [host for host, state in outcome.states.items() if state == 'unreachable']
-        back = f'; {", ".join(lost)}, if it has, does so within {rollback_sec:g} s' if lost else ''
-        _tell(f"error: '{system}' was not deployed: all that had changed went back{back}")
-    else:
-        count = sum(state == 'changed' for state in outcome.states.values())
-        hosts = '1 host' if count == 1 else f'{count} hosts'
-        _tell(f'{system}: {hosts} {would}changed' if count else f'{system}: nothing to do')
-    return code
+    states = list(outcome.states.values())
+    if outcome.code:
+        back = f'; one that was lost does so within {rollback_sec:g} s'
+        more = back if 'unreachable' in states else ''
+        _tell(f"error: '{system}' was not deployed: all that had changed went back{more}")
+        return
+    count = states.count('changed')
+    hosts = '1 host' if count == 1 else f'{count} hosts'
+    _tell(f'{system}: {hosts} {would}changed' if count else f'{system}: nothing to do')
 
 
 def export_ansible(
@@ -118,21 +109,17 @@ def export_ansible(
         ComposerError: A file is there that was edited, or a package is not here.
     """
     with variables_noted() as names:
-        context = read_deployed(paths, words, set_values, needs_hosts=True)
+        context = _read(paths, words, set_values, needs_hosts=True)
     if context is None:
         return ExitCode.FAILED
-    bundle = create_bundle(context, paths, words, set_values, choose_read(names))
+    bundle = _create_bundle(context, paths, words, set_values, names)
     for path in bundle.write(output, choose_hosts(context.spec)):
         _tell(f'wrote {path}')
     return ExitCode.DONE
 
 
-def read_deployed(
-    paths: Sequence[Path],
-    words: Sequence[str],
-    set_values: Sequence[str],
-    *,
-    needs_hosts: bool,
+def _read(
+    paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str], *, needs_hosts: bool
 ) -> CheckContext | None:
     """Return a system without errors, as it is checked here; `None` if it has errors.
 
@@ -147,22 +134,23 @@ def read_deployed(
     return None if has_errors(findings) else context
 
 
-def create_bundle(
+def _create_bundle(
     context: CheckContext,
     paths: Sequence[Path],
     words: Sequence[str],
     set_values: Sequence[str],
-    read: dict[str, bool],
+    names: Collection[str],
 ) -> Bundle:
-    """Return what the hosts of a system are brought.
-
-    Raises:
-        ComposerError: The value of a variable stands on the command line.
-    """
-    given = [*words, *(f'--set={value}' for value in set_values)]
+    given, read = [*words, *(f'--set={value}' for value in set_values)], choose_read(names)
     check_words(given, read)
-    addresses = find_addresses(context.spec)
-    return Bundle(context, paths, list_files(context), given, read, addresses)
+    spec, addresses = context.spec, find_addresses(context.spec)
+    given += [f'--set=hosts.{name}.address={address}' for name, address in addresses.items()]
+    hosts = {
+        name: replace(host, address=addresses.get(name, host.address))
+        for name, host in spec.hosts.items()
+    }
+    found = replace(context, spec=replace(spec, hosts=hosts))
+    return Bundle(found, paths, list_files(context), given, read)
 
 
 def find_addresses(spec: SystemSpec) -> dict[str, str]:
@@ -174,12 +162,10 @@ def find_addresses(spec: SystemSpec) -> dict[str, str]:
     addresses = {}
     for host in list_sought(spec, used_hosts(spec)):
         address = _find_real_address(host)
-        if address == host.address:
-            continue
         known = f"host {host.name}: '{host.address}' is {address} for ssh here (HostName)"
-        if is_loopback(address):
+        if is_loopback(address) and address != host.address:
             _tell(f"warning: {known}: all hosts must know it as '{host.address}'")
-        else:
+        elif address != host.address:
             _tell(f'{known}: the hosts find each other by that')
             addresses[host.name] = address
     return addresses
@@ -187,20 +173,12 @@ def find_addresses(spec: SystemSpec) -> dict[str, str]:
 
 def _find_real_address(host: HostSpec) -> str:
     """Return the `HostName` that the configuration of ssh has for the address of a host."""
+    command = ['ssh', '-G', '--', host.address]
     try:
-        done = subprocess.run(  # noqa: S603 - ssh itself reads its configuration
-            ['ssh', '-G', '--', host.address],  # noqa: S607 - that of the PATH, as Ansible runs it
-            check=False,
-            capture_output=True,
-            text=True,
-            stdin=subprocess.DEVNULL,
-        )
-    except FileNotFoundError as error:
-        message = 'hosts are reached by ssh, which is not installed'
-        raise ComposerError(message, help='install openssh-client') from error
-    if done.returncode:
-        message = f'host {host.name} ({host.address}): {done.stderr.strip()}'
-        raise ComposerError(message, help='see ~/.ssh/config')
+        done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - ssh itself reads its configuration
+    except (OSError, subprocess.CalledProcessError) as error:
+        message = f'host {host.name} ({host.address}): {getattr(error, "stderr", "") or error}'
+        raise ComposerError(message.strip(), help='see ~/.ssh/config') from error
     options = dict(line.partition(' ')[::2] for line in done.stdout.splitlines())
     return options.get('hostname') or host.address
 

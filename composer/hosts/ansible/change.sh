@@ -14,12 +14,12 @@ root=${here%/releases/*} release=${here##*/plan-} release=${release##*/} verb=$1
 folder=${root%/systems/*} guard="${unit%.service}-way-back" deadline=$(($(date +%s) + 60))
 if [ "$scope" = user ]; then
   export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-/run/user/$(id -u)}"
-  runtime=$XDG_RUNTIME_DIR units=${XDG_CONFIG_HOME:-$HOME/.config}/systemd/user log=--user-unit
+  runtime=$XDG_RUNTIME_DIR config=${XDG_CONFIG_HOME:-$HOME/.config} log=--user-unit
 else
-  runtime=/run units=/etc/systemd/system log=--unit
+  runtime=/run config=/etc log=--unit
 fi
 taken_back="$part heard nothing of the deployment for $seconds s, and went back"
-hold=$runtime/composer/$unit.hold lock=$runtime/composer/$unit.lock
+units=$config/systemd/$scope hold=$runtime/composer/$unit.hold lock=$runtime/composer/$unit.lock
 
 fail() { printf '%s\n' "$*" >&2; exit 1; }
 ctl() { systemctl --"$scope" "$@"; }
@@ -90,12 +90,14 @@ look() {
     [ ! -d "$lock" ] || fail "'$part' is being deployed by $(read_file "$lock/owner")"
     sh "$root/change" back >/dev/null
   fi
-  conflicts=$(list_conflicts)
-  [ -z "$conflicts" ] || fail "$conflicts"
+  [ -e "$here/change" ] || fail "the rest of an earlier deployment was removed: deploy again"
   if [ ! -e "$here/part" ]; then
     if [ -e "$root/current" ]; then echo remove; else echo nothing; fi
     return
-  elif ! runs; then
+  fi
+  conflicts=$(list_conflicts)
+  [ -z "$conflicts" ] || fail "$conflicts"
+  if ! runs; then
     echo start
   elif [ "$(read_file "$root/current")" = "$release" ] &&
     (cd "$root/live" && sha256sum --status -c "$root/sums"); then
@@ -148,7 +150,7 @@ install() {
 # Composer in the release, with the variables of the unit.
 in_unit() {
   set -- "$here/part" "$@"
-  file=$(sed -n 's/^EnvironmentFile=//p' "$here/unit")
+  file=$(sed -n 's/^EnvironmentFile=//p' "$here/unit" | sed "s|%E|$config|")
   systemd-run --"$scope" --quiet --collect --wait --pipe ${file:+--property=EnvironmentFile="$file"} \
     --setenv=PYTHONDONTWRITEBYTECODE=1 "$@" </dev/null
 }
@@ -208,10 +210,14 @@ lament() {
   fail "$part did not start"
 }
 
+starts() {
+  case $(read_file "$lock/action") in start | restart) ;; *) return 1 ;; esac
+}
+
 held() {
   step
   exec 9>&-
-  case $(read_file "$lock/action") in start | restart) ;; *) return 0 ;; esac
+  starts || return 0
   while [ -e "$hold" ] && [ ! -s "$hold" ]; do watch; sleep 0.1; done
   watch
 }
@@ -231,7 +237,7 @@ go() {
 up() {
   step
   exec 9>&-
-  case $(read_file "$lock/action") in start | restart) ;; *) return 0 ;; esac
+  starts || return 0
   while watch && [ "$state" = activating ]; do sleep 0.1; done
   # Long enough for systems of one name, say, to notice each other.
   sleep 1
