@@ -51,7 +51,7 @@ def resolve_path(text: str, folder: Path) -> Path:
         help_text = explain_missing_package(package, list_packages())
         raise PackagePathError(message, help=help_text)
     path = share / rest
-    source = None if path.is_symlink() else find_source(share)
+    source = None if os.path.islink(path) else find_source(share)  # noqa: PTH114 - for any name
     is_copy = source is not None and os.path.isfile(path) and os.path.isfile(source / rest)
     return source / rest if source and is_copy else path
 

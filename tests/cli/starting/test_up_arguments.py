@@ -38,7 +38,9 @@ def test_help_after_or_before_a_file_shows_its_arguments(run, option, first):
     code, out, err = run('up', *([option, file] if first else [file, option]))
     assert (code, err) == (0, '')
     usage, arguments = out.split(f'\n{file}: ')
-    assert usage.startswith('Usage: composer up [OPTIONS] FILE [LAYER]... [NAME:=VALUE]...\n')
+    assert usage.startswith(
+        'Usage: composer up [OPTIONS] [PACKAGE] FILE [LAYER]... [NAME:=VALUE]...\n'
+    )
     assert arguments == CALCULATOR_ARGUMENTS
 
 
