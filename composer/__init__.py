@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from composer.api import check, load, up
     from composer.errors import (
+        AbortedError,
         ActionNotAvailableError,
         CallError,
         CallTimeoutError,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.behaviour_node import Node
 
 __all__ = [
+    'AbortedError',
     'ActionNotAvailableError',
     'CallError',
     'CallTimeoutError',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -52,6 +53,18 @@ class EndedWhileWaitingError(SystemExit):
             'it still waited here when the system ended: wait with node.sleep, '
             'or until node.stopping'
         )
+
+
+class AbortedError(ComposerError):
+    """Raised by the behaviour of an action that gives its goal up: no error, but its end.
+
+    Attributes:
+        result: The payload of the result; `None` for an empty one.
+    """
+
+    def __init__(self, reason: str = '', result: Any = None) -> None:
+        super().__init__(reason)
+        self.result = result
 
 
 class SystemStoppingError(ComposerError):

@@ -12,6 +12,7 @@ from rclpy.action import CancelResponse, GoalResponse
 from rclpy.action.server import RCLError
 from rclpy.qos import QoSProfile
 
+from composer.errors import AbortedError
 from composer.interfaces.classes import import_interface
 from composer.python_source.function_kinds import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
@@ -201,7 +202,8 @@ class _Execution:
         self._queue = queue
         self._name = node.ros.resolve_action_name(spec.action)
         self._node_name = node.full_name
-        self._begin = node.bind(spec.behaviour, Owner('action', spec.name))
+        self._owner = Owner('action', spec.name)
+        self._begin = node.bind(spec.behaviour, self._owner)
         self._result_class = action_class.Result
         self._to_result = converter_for(action_class.Result).convert
         self._to_feedback = converter_for(action_class.Feedback).convert
@@ -211,9 +213,7 @@ class _Execution:
             FunctionKind.COROUTINE: self._run_coroutine,
             FunctionKind.PLAIN: self._run_function,
         }[kind_of(self._begin)]
-        self._call = node.call(
-            Owner('action', spec.name), spec.path, run, options=spec, deliver=return_result
-        )
+        self._call = node.call(self._owner, spec.path, run, options=spec, deliver=return_result)
         self.is_async = self._call.is_async
 
     async def execute(self, goal: Any) -> Any:
@@ -248,40 +248,71 @@ class _Execution:
         return self._node.system.stop.is_set or not gate.serves or gate.rests
 
     def _run_function(self, goal: Any, _progress: Progress) -> Any:
-        return self._succeed(goal, self._begin(goal.request))
+        try:
+            return self._succeed(goal, self._begin(goal.request))
+        except AbortedError as error:
+            return self._abort(goal, error)
 
     async def _run_coroutine(self, goal: Any, _progress: Progress) -> Any:
-        return self._succeed(goal, await self._begin(goal.request))
+        try:
+            return self._succeed(goal, await self._begin(goal.request))
+        except AbortedError as error:
+            return self._abort(goal, error)
 
     def _run_generator(self, goal: Any, progress: Progress) -> Any:
-        with closing(self._begin(goal.request)) as generator:
-            while True:
-                try:
-                    feedback = next(generator)
-                except StopIteration as end:
-                    return self._succeed(goal, end.value)
-                if self._must_end(goal):
-                    break
-                self._publish(goal, feedback)
-                progress.resume()
+        try:
+            with closing(self._begin(goal.request)) as generator:
+                while True:
+                    try:
+                        feedback = next(generator)
+                    except StopIteration as end:
+                        return self._succeed(goal, end.value)
+                    if self._must_end(goal):
+                        return self._end_at_yield(goal, generator)
+                    self._publish(goal, feedback)
+                    progress.resume()
+        except AbortedError as error:
+            return self._abort(goal, error)
+
+    def _end_at_yield(self, goal: Any, generator: Any) -> Any:
+        """End a goal that may not go on; what its generator returns then is the result."""
+        payload = None
+        try:
+            generator.throw(GeneratorExit())
+        except GeneratorExit:
+            pass
+        except StopIteration as end:
+            payload = end.value
+        result = self._result_class() if payload is None else self._to_result(payload)
         self._end_early(goal)
-        return self._result_class()
+        return result
 
     async def _run_async_generator(self, goal: Any, progress: Progress) -> Any:
         # An async generator cannot return a value: what it yields last is the result.
         held: list[Any] = []
-        async with aclosing(self._begin(goal.request)) as generator:
-            async for item in generator:
-                if self._must_end(goal):
-                    break
-                for feedback in held:
-                    self._publish(goal, feedback)
-                held = [item]
-                progress.resume()
-            else:
-                return self._succeed(goal, held[0] if held else None)
+        try:
+            async with aclosing(self._begin(goal.request)) as generator:
+                async for item in generator:
+                    if self._must_end(goal):
+                        break
+                    for feedback in held:
+                        self._publish(goal, feedback)
+                    held = [item]
+                    progress.resume()
+                else:
+                    return self._succeed(goal, held[0] if held else None)
+        except AbortedError as error:
+            return self._abort(goal, error)
         self._end_early(goal)
         return self._result_class()
+
+    def _abort(self, goal: Any, error: AbortedError) -> Any:
+        """End a goal as its behaviour has planned; no error of the node."""
+        result = self._result_class() if error.result is None else self._to_result(error.result)
+        reason = f': {error}' if str(error) else ''
+        self._node.ros.get_logger().info(f'{self._owner} aborted a goal{reason}')
+        goal.abort()
+        return result
 
     def _succeed(self, goal: Any, payload: Any) -> Any:
         result = self._to_result(payload)

@@ -27,6 +27,8 @@ CODE = """
 import threading
 import time
 
+from composer import AbortedError
+
 released = threading.Event()
 
 def plain(node, goal):
@@ -61,6 +63,24 @@ async def forever_async(node, goal):
             time.sleep(0.01)
     finally:
         node.logger.info(f'cleaned up {goal.order}')
+
+def give_up(node, goal):
+    yield [1]
+    raise AbortedError('blocked', [goal.order, 7])
+
+async def give_up_async(node, goal):
+    raise AbortedError('blocked', [goal.order, 7])
+
+def give_up_plain(node, goal):
+    raise AbortedError
+
+def interrupted(node, goal):
+    try:
+        while True:
+            yield
+            time.sleep(0.01)
+    except GeneratorExit:
+        return [goal.order, 8]
 
 def fail(node, goal):
     yield [1]
@@ -113,6 +133,10 @@ KINDS = [
     'async_generator',
     'forever',
     'forever_async',
+    'give_up',
+    'give_up_async',
+    'give_up_plain',
+    'interrupted',
     'fail',
     'fail_async',
     'wrong_feedback',
@@ -270,6 +294,28 @@ def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(
     assert client.cancel(handle) == 1
     assert client.end(handle) == ('canceled', [])
     child.wait_for_line(f'[server]: cleaned up {order}')
+
+
+@pytest.mark.parametrize(
+    ('name', 'result', 'said'),
+    [
+        ('give_up', [2, 7], 'aborted a goal: blocked'),
+        ('give_up_async', [2, 7], 'aborted a goal: blocked'),
+        ('give_up_plain', [], 'aborted a goal'),
+    ],
+)
+def test_a_planned_abort_has_a_result_and_is_no_error(child, shared_connect, name, result, said):
+    client = shared_connect(name)
+    assert client.end(client.begin(2)) == ('aborted', result)
+    assert said in child.wait_for_line(f"[INFO] [server]: action '{name}'")
+    assert not child.matching(f"action '{name}' (system.yaml")
+
+
+def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(shared_connect):
+    client = shared_connect('interrupted')
+    handle = client.begin(4)
+    assert client.cancel(handle) == 1
+    assert client.end(handle) == ('canceled', [4, 8])
 
 
 @pytest.mark.parametrize(
