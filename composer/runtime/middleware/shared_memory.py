@@ -61,9 +61,10 @@ def replacing_ports(domain_id: int) -> Iterator[None]:
     """
     # Measured with Fast DDS 2.14 and workers that hear 2,000 messages a second: without this, 1 of
     # 52 that were killed was deaf and mute afterwards, for as long as the others ran, and 4 of 5
-    # that were killed in between; with it 0 of 44, and 1 of 30, where five start at a time. It is
-    # the port for data, not that for discovery. No setting of Fast DDS tells the others. A port of
-    # its own for each process, by a random `offsetd3`, may be one that was left, too: 6 of 30.
+    # that were killed in between; with it 0 of 44, and of five that start at a time, one was deaf
+    # in the fifth round. It is the port for data, not that for discovery. No setting of Fast DDS
+    # tells the others. A port of its own for each process, by a random `offsetd3`, may be one that
+    # was left, too: 6 of 30.
     with ExitStack() as opened:
         ports = list(islice(_open_ports(opened, domain_id), _MOST_PORTS))
         yield
