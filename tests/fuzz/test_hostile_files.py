@@ -48,8 +48,11 @@ def _run_in_child(folder, output, words, more):
     os._exit(code)
 
 
-# What is followed for as long as the limits of inference allow.
-SLOW = ('chain_of_attributes', 'functions_that_call_each_other', 'many_modules')
+# What is followed for as long as the limits allow.
+SLOW = (
+    *('chain_of_attributes', 'chain_of_elif', 'classes', 'functions_that_call_each_other'),
+    *('many_modules', 'thousands_of_unknown_publishers'),
+)
 
 
 @pytest.mark.parametrize(
