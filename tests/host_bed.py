@@ -26,6 +26,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from contextlib import suppress
 from pathlib import Path
 
@@ -47,6 +48,15 @@ _PROGRAMS = (
 )
 # What ends with who started it, whatever becomes of that.
 _BOUND = ('setpriv', '--pdeathsig', 'KILL')
+
+# Remove the folder $0 of groups. The kernel may still be at work with what was in them.
+_LEAVE_GROUPS = """
+for each in $(seq 200); do
+  [ -d "$0" ] || exit 0
+  find "$0" -depth -type d -delete 2>/dev/null && exit 0
+  sleep 0.05
+done
+"""
 
 # Run in the namespaces of a host, with its folder and name: $1 and $2.
 _BOOT = """
@@ -105,7 +115,7 @@ class Bed:
 
     def __init__(self, folder, names):
         self.folder = Path(folder)
-        self.groups = self.folder / 'cgroups' / f'bed-{os.getpid()}'
+        self.groups = self.folder / 'cgroups' / f'bed-{uuid.uuid4().hex}'
         self.home = self.folder / 'laptop'
         self.hosts = {
             name: Host(self, name, f'10.77.1.{number}') for number, name in enumerate(names, 1)
@@ -131,8 +141,7 @@ class Bed:
         for host in self.hosts.values():
             host.kill()
         with suppress(subprocess.CalledProcessError):
-            # What their processes have left empty.
-            self.enter('find', str(self.groups), '-depth', '-type', 'd', '-delete')
+            self.enter('sh', '-c', _LEAVE_GROUPS, str(self.groups))
         self._laptop.kill()
         self._laptop.wait()
 

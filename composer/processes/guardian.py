@@ -71,6 +71,8 @@ class Guardian:
         self._exit_sec = exit_sec
         self._deadline = _NEVER
         self._interrupts = 0
+        # Whether Composer itself stops, and tells when that is over.
+        self._is_stopping = False
         self._has_left = False
         self._unread = b''
         self._silent_looks: float = _NEVER
@@ -99,19 +101,29 @@ class Guardian:
                         '[ERROR] [composer]: the system ends, because a behaviour has closed '
                         'descriptors that are not its own'
                     )
-                    self._take(BEGUN)
+                    self._take(signal.SIGHUP)
+                    self._is_stopping = False
                     # Not counted if the system stops already.
                     self._signal(signal.SIGHUP)
                 self._take_all(data)
             # It may have reported a signal right before its end.
             if self._ended in ready:
-                if self._deadline == _NEVER:
-                    tell(
-                        '[FATAL] [composer]: the process ended without a stop: it crashed or was '
-                        'killed, or a behaviour called os._exit or closed all descriptors'
-                    )
+                self._tell_end()
                 return True
         return False
+
+    def _tell_end(self) -> None:
+        if self._deadline == _NEVER:
+            when = 'without a stop'
+        # A user who interrupts twice has it end at once.
+        elif self._is_stopping and self._interrupts <= 1:
+            when = 'before its stop was over'
+        else:
+            return
+        tell(
+            f'[FATAL] [composer]: the process ended {when}: it crashed or was killed, or a '
+            'behaviour called os._exit or closed all descriptors'
+        )
 
     def _take_all(self, data: bytes) -> None:
         rest = self._unread + data
@@ -134,7 +146,9 @@ class Guardian:
                 self._deadline = min(self._deadline, now + _HURRY_SEC)
         if byte in {*_INTERRUPTS, signal.SIGHUP, BEGUN}:
             self._deadline = min(self._deadline, now + self._stop_sec)
+            self._is_stopping |= byte == BEGUN
         elif byte == OVER:
+            self._is_stopping = False
             self._deadline = now + self._exit_sec
         elif byte == LEAVE:
             self._has_left = True

@@ -126,6 +126,7 @@ def run_system(  # noqa: PLR0913 - one for each part
             system_logger.error(str(error))
         signals.end_with(code)
         if not ended:
+            guardian.end_stop()
             _end_process(code)
     return code
 
