@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 _UNDEFINED_NAME = re.compile(r"'([^']+)' is undefined")
+_UNKNOWN_FILTER = re.compile(r"there is no filter '(\w+)'")
 _ENV = re.compile(r"""\benv\(\s*['"]([^'"]*)['"]""")
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
@@ -169,7 +170,9 @@ class TemplateEvaluator:
             if is_sure:
                 self._sandbox.explained += 1
                 origin = self._hidden_origin(text, expressions)
-                self.document.diagnostics.append(self._explain(error, span, origin))
+                part = _part_at_fault(error, text, expressions)
+                place = span.narrowed_to(part, first=True)
+                self.document.diagnostics.append(self._explain(error, place, origin))
             return text
 
     def _compute(self, text: str, expressions: list[slice], span: Span) -> Any:
@@ -284,6 +287,13 @@ class TemplateEvaluator:
                 related=[Related('also used here', self.positions.key(other))],
             )
         )
+
+
+def _part_at_fault(error: Exception, text: str, expressions: list[slice]) -> str:
+    """Return what of a text an error is about: an unknown filter, or the only expression."""
+    if named := _UNKNOWN_FILTER.search(str(error)):
+        return named.group(1)
+    return text[expressions[0]] if len(expressions) == 1 else ''
 
 
 def _is_left_out(found: Any, written: Any, path: DataPath) -> bool:

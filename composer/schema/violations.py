@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
@@ -66,7 +67,15 @@ class Violation:
         if self.conflicting:
             return self._conflict(positions)
         span = positions.key(self.path) if self.at_key else positions.value(self.path)
-        return diagnostic_at(span, self.rule, self.message, help=self.help)
+        return diagnostic_at(span, self.rule, self._quoting(span), help=self.help)
+
+    def _quoting(self, span: Span) -> str:
+        """Return the message with a number as it stands in the file: 1.50, not 1.5."""
+        head, got, shown = self.message.rpartition(', got ')
+        with suppress(ValueError):
+            if got and float(shown) == float(span.text.replace('_', '')):
+                return f'{head}{got}{span.text}'
+        return self.message
 
     def _conflict(self, positions: SourceMap) -> Diagnostic:
         """Return the finding at the last key that is not merged into the mapping."""

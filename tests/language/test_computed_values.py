@@ -117,7 +117,7 @@ def test_a_value_is_computed_after_those_that_it_needs_whatever_the_order_of_the
             ],
         ),
         # One that follows from another is not told.
-        ('vars: {a: "{{ 1 // 0 }}", b: "{{ a + 1 }}"}', [('bad-expression', '2:11', None)]),
+        ('vars: {a: "{{ 1 // 0 }}", b: "{{ a + 1 }}"}', [('bad-expression', '2:12', None)]),
         ('vars: {a: "{{ bb }}", b: 1}', [('undefined-name', '2:15', "'bb' is not defined")]),
         # What an argument without a value will be is not known.
         ('args: {n: {type: string}, a: {type: integer, default: "{{ n | int }}"}}', []),

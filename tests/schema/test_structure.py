@@ -129,8 +129,8 @@ def test_a_right_file_has_no_findings():
             ),
         ),
         (
-            HEAD + 'nodes: {}\nexecutor: {threads: 1.5}',
-            ('wrong-type', 'expected an integer, got 1.5', '3:21', None),
+            HEAD + 'nodes: {}\nexecutor: {threads: 1.50}',
+            ('wrong-type', 'expected an integer, got 1.50', '3:21', None),
         ),
         (
             HEAD + 'nodes: {}\nexecutor: {threads: 2000}',
