@@ -31,6 +31,12 @@ def with_article(noun: str) -> str:
     return f'an {noun}' if noun[0] in 'aeiou' else f'a {noun}'
 
 
+def count_of(number: int, noun: str) -> str:
+    """Return `1 node`, `2 nodes`, `2 processes`."""
+    plural = f'{noun}es' if noun.endswith('s') else f'{noun}s'
+    return f'{number} {noun if number == 1 else plural}'
+
+
 def find_node_name_problem(name: str) -> str | None:
     """Return why `name` cannot name a node, or `None` if it can."""
     if not name:

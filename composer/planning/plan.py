@@ -6,6 +6,7 @@ from collections import Counter
 from enum import Enum
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from composer.names import count_of
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -99,8 +100,7 @@ class Plan:
         """Return `~1 timer, +2 subscriptions`."""
         counts = Counter((each.action, each.noun) for each in self.operations)
         return ', '.join(
-            f'{action.value}{count} {noun if count == 1 else f"{noun}s"}'
-            for (action, noun), count in counts.items()
+            f'{action.value}{count_of(count, noun)}' for (action, noun), count in counts.items()
         )
 
     def describe_rebuilt(self) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from composer.confidential import may_show_lines
+from composer.names import count_of
 from composer.reports.report import count_severities
 from composer.rules import Severity
 from composer.terminal import escape, escape_lines
@@ -68,25 +69,20 @@ def _list_crossings(file: CheckedFile) -> str:
 
 def _count_content(file: CheckedFile) -> str:
     if file.cases is not None:
-        return count(file.cases, 'case')
+        return count_of(file.cases, 'case')
     if file.nodes == 0 and file.processes:
         number = file.processes
         return '1 external process' if number == 1 else f'{number} external processes'
-    return '' if file.nodes is None else count(file.nodes, 'node')
+    return '' if file.nodes is None else count_of(file.nodes, 'node')
 
 
 def summarize(findings: Sequence[Diagnostic]) -> str:
     """Return `2 errors and 1 warning in 1 file`."""
     errors, warnings = count_severities(findings)
-    counts = [count(errors, 'error')] if errors else []
-    counts += [count(warnings, 'warning')] if warnings else []
+    counts = [count_of(errors, 'error')] if errors else []
+    counts += [count_of(warnings, 'warning')] if warnings else []
     files = len({finding.file for finding in findings})
-    return f'{" and ".join(counts)} in {count(files, "file")}'
-
-
-def count(number: int, noun: str) -> str:
-    """Return `1 node`, `2 nodes`."""
-    return f'{number} {noun}' if number == 1 else f'{number} {noun}s'
+    return f'{" and ".join(counts)} in {count_of(files, "file")}'
 
 
 def render_finding(finding: Diagnostic, *, colour: bool = False) -> str:
@@ -198,7 +194,7 @@ def _summarize_run(report: Report) -> str:
     counts = [(report.count('failed'), 'failed'), (report.count('passed'), 'passed')]
     parts = [f'{number} {word}' for number, word in counts if number]
     if errors := report.count('error'):
-        parts.append(count(errors, 'error'))
+        parts.append(count_of(errors, 'error'))
     if report.deselected:
         parts.append(f'{report.deselected} deselected')
     simulated = sum(case.result.simulated_sec for case in report.cases or ())
@@ -245,7 +241,7 @@ def _render_surroundings(result: CaseResult) -> Iterator[str]:
             continue
         yield f'--- {title} ---'
         if len(lines) > _MOST_LINES:
-            yield f'({count(len(lines) - _MOST_LINES, "line")} before)'
+            yield f'({count_of(len(lines) - _MOST_LINES, "line")} before)'
         yield from map(escape_lines, lines[-_MOST_LINES:])
         yield ''
 
@@ -253,7 +249,7 @@ def _render_surroundings(result: CaseResult) -> Iterator[str]:
 def _describe_orders(case: CaseReport) -> str:
     failed = sum(not attempt.result.has_passed for attempt in case.attempts)
     differing = sum(bool(attempt.difference) for attempt in case.attempts)
-    text = f'{count(len(case.attempts), "other order")} tried, {differing} with other events'
+    text = f'{count_of(len(case.attempts), "other order")} tried, {differing} with other events'
     return f'({text}, {failed} failed)' if failed else f'({text})'
 
 

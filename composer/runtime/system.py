@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.errors import ExitCode
+from composer.names import count_of
 from composer.planning.differences import compare
 from composer.runtime.health.introductions import Introductions
 from composer.runtime.health.other_hosts import OtherHosts
@@ -211,11 +212,6 @@ class System(LocalPart):
 
 def _describe_parts(**counts: int) -> str:
     """Return `2 nodes, 3 components and 1 process`; what there is none of is left out."""
-    parts = [_count(number, noun) for noun, number in counts.items() if number]
+    parts = [count_of(number, noun) for noun, number in counts.items() if number]
     *first, last = parts or ['0 nodes']
     return f'{", ".join(first)} and {last}' if first else last
-
-
-def _count(number: int, noun: str) -> str:
-    plural = f'{noun}es' if noun.endswith('s') else f'{noun}s'
-    return f'{number} {noun if number == 1 else plural}'

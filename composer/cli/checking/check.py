@@ -9,9 +9,10 @@ import click
 from composer.application.check import check as find_errors
 from composer.application.output import wants_colour, write_file
 from composer.errors import ExitCode, UsageError
+from composer.names import count_of
 from composer.records import record
 from composer.reports import render_report
-from composer.reports.text import count, render_files, summarize
+from composer.reports.text import render_files, summarize
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,7 +73,7 @@ def _show(report: Report, options: ReportOptions) -> None:
         click.echo(line, err=True)
     summary = [summarize(report.findings)] if report.findings else []
     if report.combinations:
-        summary.append(f'{count(report.combinations, "combination")} checked')
+        summary.append(f'{count_of(report.combinations, "combination")} checked')
     if summary:
         click.echo(', '.join(summary), err=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from composer import names
 from composer.names import with_article
 from composer.scenarios.times import format_seconds
 
@@ -20,9 +21,7 @@ def in_window(window: WindowSpec) -> str:
 
 def count_of(number: int, noun: str) -> str:
     """Return `no message`, `1 message`, `2 messages`."""
-    if number == 0:
-        return f'no {noun}'
-    return f'1 {noun}' if number == 1 else f'{number} {noun}s'
+    return names.count_of(number, noun) if number else f'no {noun}'
 
 
 def expected_count(least: int, most: int | None, noun: str) -> str:
