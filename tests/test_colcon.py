@@ -63,6 +63,7 @@ def source_environment(workspace):
 
 
 @pytest.mark.ros
+@pytest.mark.long
 @pytest.mark.parametrize(
     'options',
     [[], ['--symlink-install', '--merge-install']],

@@ -17,6 +17,7 @@ TALK = f'{ROOT_THERE}/live/files/behaviours/talk.py'
 MOST_SEC = 12.0
 
 
+@pytest.mark.long
 def test_a_system_is_deployed_planned_and_edited(bed, tmp_path):
     project = Project(bed, tmp_path / 'duo')
     project.ensure()

@@ -43,6 +43,7 @@ def start(project, *words):
     return process
 
 
+@pytest.mark.long
 def test_if_one_host_cannot_start_all_go_back(project, before):
     project.edit('behaviours/counting.py', 'pass', "raise ValueError('no sensor')")
     project.edit('robot.yaml', 'domain_id: 20', 'domain_id: 21')

@@ -135,6 +135,7 @@ def check_that_they_are_the_same(here, there, words, *options):
     return first
 
 
+@pytest.mark.long
 def test_idioms_that_depend_on_addresses_and_real_time_are_the_same(tmp_path):
     here = tmp_path / 'here'
     here.mkdir()

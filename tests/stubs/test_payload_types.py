@@ -164,6 +164,7 @@ def show(folder, numbers):
     return [lines[number - 1].strip() for number in sorted(numbers)]
 
 
+@pytest.mark.long
 def test_check_refuses_what_does_not_fit_and_types_find_nothing_else(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
