@@ -216,11 +216,19 @@ def create_loader(
     words: Sequence[str] | None = None,
     set_values: Sequence[str] = (),
     before: LoadedSystem | None = None,
+    ros_arguments: Sequence[str] = (),
 ) -> partial[LoadedSystem]:
     """Return what loads a system as often as it is called; see `load_given`."""
     path, text = read_standard_input(paths[0])
     return partial(
-        load_system, path, words, layers=paths[1:], set_values=set_values, text=text, before=before
+        load_system,
+        path,
+        words,
+        layers=paths[1:],
+        set_values=set_values,
+        text=text,
+        before=before,
+        ros_arguments=ros_arguments,
     )
 
 

@@ -43,6 +43,7 @@ class SystemReader:
         set_values: Values to change.
         host: The host whose part runs here; empty for the whole system.
         reader: Reads the values that are known when the system starts.
+        ros_arguments: The arguments after `--ros-args` of the command line.
     """
 
     paths: Sequence[Path]
@@ -50,6 +51,7 @@ class SystemReader:
     set_values: Sequence[str]
     host: str = ''
     reader: StartValueReader = field(default_factory=StartValueReader)
+    ros_arguments: Sequence[str] = ()
 
     def check(self, report: Report = show_findings) -> CheckContext | None:
         """Return a system without errors; `None` if there are errors.
@@ -82,7 +84,9 @@ class SystemReader:
             StartValueError: A value that is known when the system starts cannot be read.
         """
         system_before = before.system if before else None
-        load = create_loader(self.paths, self.words, self.set_values, system_before)
+        load = create_loader(
+            self.paths, self.words, self.set_values, system_before, self.ros_arguments
+        )
         system = load()
         loaded(system)
         # It is much code, which is read meanwhile.

@@ -92,7 +92,7 @@ def up(  # noqa: PLR0913 - one for each option
         raise UsageError(message, help='give a file')
     if ends_process:
         check_kernel()
-    reader = SystemReader(paths, words, set_values, host, StartValueReader(host))
+    reader = SystemReader(paths, words, set_values, host, StartValueReader(host), ros_arguments)
     begun_ns = time_ns()
     with Workers(ros_arguments, log_levels) as workers:
         context, _files, told = reader.read(

@@ -23,6 +23,7 @@
                                             over within the process; empty without another end
      "delivery_reason": "durability: transient_local",   why they are sent; "other worker" and
                                             "other host" for what crosses
+     "by_parameter": {"topic": "prefix"},   what follows which parameter of the node
      "findings", "file", "line"}],
   "waits": [{"node": <id>, "for": <id>, "file", "line"}],
   "findings": [                those of `composer check`; above they are indices into this list
@@ -111,6 +112,7 @@ def _edge(picture: Picture, edge: Edge) -> dict[str, Any]:
         'qos': dict(edge.qos),
         'delivery': edge.delivery.way,
         'delivery_reason': edge.delivery.reason,
+        'by_parameter': dict(edge.by_parameter),
         'findings': list(edge.findings),
         **_place_of(picture, edge.path),
     }

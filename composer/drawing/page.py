@@ -151,5 +151,5 @@ def _describe_channel(channel: ChannelBox) -> dict[str, Any]:
 def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:
     qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
     delivery = [f'delivery: {edge.delivery}'] if edge.delivery.way else []
-    facts = [edge.type, *qos, *delivery]
+    facts = [edge.type, *qos, *delivery, *filter(None, [edge.followed])]
     return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': facts}

@@ -86,6 +86,7 @@ class Edge:
         begins_at_node: Whether messages, requests or goals leave the node here.
         qos: The policies that differ from the default of ROS; durations in seconds.
         delivery: Which way its messages, calls or goals go.
+        by_parameter: The parameters that its name or depth follows, by these keys.
         findings: Its findings, as indices into those of the picture.
     """
 
@@ -100,11 +101,17 @@ class Edge:
     delivery: Delivery
     path: DataPath
     findings: tuple[int, ...]
+    by_parameter: Mapping[str, str]
 
     @property
     def ends(self) -> tuple[str, str]:
         """The ids of where it begins and where it ends."""
         return (self.node, self.channel) if self.begins_at_node else (self.channel, self.node)
+
+    @property
+    def followed(self) -> str:
+        """What follows parameters, in words; empty for nothing."""
+        return ', '.join(f'{key} by parameter {name}' for key, name in self.by_parameter.items())
 
 
 @record
@@ -295,6 +302,10 @@ def _edges(
                 deliveries[end.path],
                 end.path,
                 places.of_edge(end.path),
+                {
+                    key: each.parameter
+                    for key, each in getattr(end.entity, 'by_parameter', {}).items()
+                },
             )
 
 

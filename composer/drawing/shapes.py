@@ -210,7 +210,7 @@ def _edge_line(edge: Edge, tokens: dict[str, str], remarks: _Remarks) -> Line:
     start, end = edge.ends
     # External ends are drawn.
     delivery = '' if edge.delivery.reason == OUTSIDE else str(edge.delivery)
-    details = filter(None, (describe_policies(edge.qos), delivery))
+    details = filter(None, (describe_policies(edge.qos), delivery, edge.followed))
     return Line(
         tokens[edge.id],
         edge.id,

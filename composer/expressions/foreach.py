@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from jinja2 import TemplateRuntimeError
 
@@ -27,14 +28,19 @@ from composer.yaml_text.positions import Branch
 from composer.yaml_text.scalars import format_scalar, suggest_bool
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping
 
     from composer.expressions.scope import Scope
     from composer.yaml_text.document import Document
     from composer.yaml_text.positions import DataPath, Key
 
+# By the defaults of the file, the key of a node, what it says, and the name of a parameter:
+# what is wrong with it, and what it starts with.
+FindList: TypeAlias = 'Callable[[Mapping[str, Any], str, Mapping[str, Any], Any], tuple[str, Any]]'
+
 _FOREACH = 'foreach'
 _WHEN = 'when'
+_PARAMETER = 'parameter'
 # The sections whose entries have entries of their own.
 _WITH_ENTRIES = (('nodes',), ('containers',))
 # The value of a variable without a list of values.
@@ -45,6 +51,7 @@ def expand_document(
     document: Document,
     data: dict[str, Any],
     scope: Scope,
+    find_list: FindList,
 ) -> dict[str, Any] | None:
     """Return data with all expressions evaluated, and entries repeated or left out.
 
@@ -53,6 +60,7 @@ def expand_document(
     Args:
         document: The document that the data are from; what is learnt on the way goes there.
         scope: What is in scope.
+        find_list: Finds the list that a parameter of a node starts with.
     """
     evaluator = TemplateEvaluator(document, scope)
     ignored = {key: value for key, value in data.items() if key.startswith('x-')}
@@ -62,6 +70,10 @@ def expand_document(
     for section in SECTIONS:
         if isinstance(data.get(section), dict):
             expansion = _Expansion(evaluator, (section,), limit, size)
+            defaults = filled.get('defaults')
+            expansion.find_list = partial(
+                find_list, defaults if isinstance(defaults, dict) else {}
+            )
             try:
                 filled[section] = expansion.expand(data[section])
             except _TooManyError:
@@ -116,6 +128,8 @@ class _Expansion:
         self._entries: dict[str, Any] = {}
         self._count = 0
         self._branches = branches
+        # Of nodes: returns what a parameter of one starts with; of their entities: that of theirs.
+        self.find_list: Callable[..., Any] | None = None
 
     def expand(self, data: dict[str, Any]) -> dict[str, Any]:
         for written, entry in data.items():
@@ -185,7 +199,8 @@ class _Expansion:
         rest = {key: value for key, value in body.items() if key not in repeated}
         filled = evaluator.evaluate_mapping(rest, path)
         written_at = self._branch(written)
-        for section in repeated:
+        # Others may be repeated for what parameters say.
+        for section in sorted(repeated, key=lambda each: each != 'parameters'):
             expansion = _Expansion(
                 evaluator,
                 (*path, section),
@@ -193,6 +208,8 @@ class _Expansion:
                 self._size,
                 written_at.inner(section),
             )
+            if self.find_list is not None and self._section == 'nodes':
+                expansion.find_list = partial(self.find_list, str(path[-1]), filled)
             filled[section] = expansion.expand(body[section])
         # As written: entities are told in this order.
         return {key: filled[key] for key in body if key in filled} | filled
@@ -238,6 +255,8 @@ class _Expansion:
         evaluator.spend_on_values(count_values(foreach[name]))
         values = evaluator.evaluate(foreach[name], at)
         is_sample = evaluator.is_sampled(at)
+        if isinstance(values, dict) and values.keys() == {_PARAMETER}:
+            values = self._list_of(values[_PARAMETER], at)
         if not isinstance(values, list):
             if at not in self._document.dropped:
                 self._report(at, f"'{name}' takes a list of values, not {values!r}")
@@ -248,6 +267,20 @@ class _Expansion:
             evaluator.spend_on_values(1)
             inner = evaluator.within(name, value, _FOREACH, is_sample=is_sample)
             yield from self._scopes(rest, path, inner)
+
+    def _list_of(self, name: Any, path: DataPath) -> Any:
+        """Return the list that a parameter of the node starts with, and note who follows it."""
+        if self.find_list is None or len(self._at) == 1:
+            problem, values = 'only entities of nodes can follow a parameter', None
+        else:
+            problem, values = self.find_list(name)
+        if problem:
+            self._report(path, f'{_FOREACH}: {problem}')
+            self._document.dropped.add(path)
+            return None
+        positions = self._evaluator.positions
+        positions.values[(*self._at[:-1], 'parameters', name, _FOREACH)] = positions.value(path)
+        return values
 
     def _holds(self, evaluator: TemplateEvaluator, condition: Any, path: DataPath) -> bool:
         holds = evaluator.evaluate(condition, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import Related, diagnostic_at
@@ -12,6 +13,12 @@ from composer.language.arguments import (
     parse_declarations,
     sample_values,
 )
+from composer.language.namespaces import full_node_name, join_namespaces, split_node_name
+from composer.language.parameter_files import parse_parameter_files
+from composer.language.parsing.entity_parser import parse_parameter
+from composer.language.paths import with_paths
+from composer.language.values.parameter_values import StartingValues
+from composer.language.values.start_values import is_start_value
 from composer.ros_parameters.parameter_types import find_texts_for_bools
 from composer.schema.structure import correct_outer_keys, is_sound
 
@@ -60,13 +67,38 @@ def evaluate_expressions(system: LoadedSystem) -> None:
     rest = {key: value for key, value in data.items() if key not in declarations}
     before = len(system.diagnostics)
     scope = compute_values(system, system.arguments, system.given, system.start)
-    expanded = expand_document(system, rest, scope)
+    expanded = expand_document(system, rest, scope, partial(_find_list, system))
     # Of a file with too many entries nothing is left.
     system.data = None if expanded is None else expanded | declarations
     if not all(isinstance(data.get(key, {}), dict) for key in ('args', 'vars')):
         # Nothing is known of the arguments, not even their names.
         found = system.diagnostics[before:]
         system.diagnostics[before:] = [each for each in found if each.rule != 'undefined-name']
+
+
+def _find_list(
+    system: LoadedSystem,
+    defaults: Mapping[str, Any],
+    key: str,
+    node: Mapping[str, Any],
+    name: Any,
+) -> tuple[str, Any]:
+    """Return what is wrong with a parameter for whose values entities are repeated, and these."""
+    declared = node.get('parameters')
+    data = declared.get(name) if isinstance(declared, dict) and isinstance(name, str) else None
+    if data is None:
+        return f"node '{key}' declares no parameter '{name}'", None
+    if is_start_value(data) or not is_sound({'nodes': {key: {'parameters': {name: data}}}}):
+        return f"the list of parameter '{name}' must stand in the file or in parameter files", None
+    spec = parse_parameter({}, name, data, ('nodes', key, 'parameters', name))
+    outer = join_namespaces(system.namespace, str(defaults.get('namespace', '')))
+    namespace, simple = split_node_name(key, dict(node))
+    full_name = full_node_name(join_namespaces(outer, str(namespace)), simple)
+    files = parse_parameter_files(with_paths(dict(node), ('nodes', key), system.positions))
+    values = StartingValues(system.ros_arguments).find(full_name, {name: spec}, files)
+    if not isinstance(values[name], list):
+        return f"parameter '{name}' of node '{key}' is no list", None
+    return '', values[name]
 
 
 def _has_expressions(positions: SourceMap) -> bool:

@@ -11,7 +11,7 @@ from composer.language.values.start_values import StartValues
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from composer.diagnostics import Related, SourceFile, Span
     from composer.language.arguments import ArgumentSpec
@@ -42,6 +42,8 @@ class LoadedSystem(Document):
         sampled_unused: As `sampled`, of what is left out.
         start: The values that are read when the system starts.
         filled: The data with these values, or samples of them, in place.
+        namespace: That of the includes around it.
+        ros_arguments: The arguments after `--ros-args` of the command line.
         spec: The system without the parts that were wrong; `None` if nothing could be read.
         unused: As `spec`, of the nodes and processes whose `when`, or that of their include, does
             not hold; and of nodes with entities whose `when` does not hold, with all of these.
@@ -58,6 +60,8 @@ class LoadedSystem(Document):
     sampled_unused: list[Span] = field(default_factory=list)
     start: StartValues = field(default_factory=StartValues)
     filled: dict[str, Any] = field(default_factory=dict)
+    namespace: str = ''
+    ros_arguments: Sequence[str] = ()
     spec: SystemSpec | None = None
     unused: SystemSpec | None = None
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)

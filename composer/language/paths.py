@@ -77,7 +77,7 @@ def resolve_paths(system: LoadedSystem) -> None:
     for section in ('nodes', 'processes', 'hosts'):
         if section in data:
             resolved[section] = {
-                name: _with_paths(entry, (section, name), positions)
+                name: with_paths(entry, (section, name), positions)
                 for name, entry in data[section].items()
             }
     system.data = replace_start_values(
@@ -91,7 +91,8 @@ def _with_file(value: dict[str, Any], path: DataPath, positions: SourceMap) -> d
     return value | {'file': _resolved(value['file'], (*path, 'file'), positions)}
 
 
-def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:
+def with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:
+    """Return an entry of a section with its paths resolved."""
     changed: dict[str, Any] = {}
     if 'cwd' in entry:
         changed['cwd'] = _resolved(entry['cwd'], (*path, 'cwd'), positions)
@@ -105,12 +106,12 @@ def _with_paths(entry: dict[str, Any], path: DataPath, positions: SourceMap) -> 
         changed['interface'] = _resolved(entry['interface'], (*path, 'interface'), positions)
     if path[0] == 'processes' and isinstance(entry.get('nodes'), dict):
         changed['nodes'] = {
-            name: node and _with_paths(node, (*path, 'nodes', name), positions)
+            name: node and with_paths(node, (*path, 'nodes', name), positions)
             for name, node in entry['nodes'].items()
         }
     if 'components' in entry:
         changed['components'] = {
-            name: _with_paths(each, (*path, 'components', name), positions)
+            name: with_paths(each, (*path, 'components', name), positions)
             for name, each in entry['components'].items()
         }
     if 'parameter_files' in entry:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from composer.yaml_text.document import Document
 
 
-def load_system(
+def load_system(  # noqa: PLR0913 - one for each part of a command line
     path: Path,
     words: Sequence[str] | None = None,
     *,
@@ -45,6 +45,7 @@ def load_system(
     text: bytes | Callable[[], Document] | None = None,
     before: LoadedSystem | None = None,
     read_value: ReadValue | None = None,
+    ros_arguments: Sequence[str] = (),
 ) -> LoadedSystem:
     """Read a file as far as it can be read.
 
@@ -56,6 +57,7 @@ def load_system(
         text: The text of the file, if it is not to be read; or what reads it.
         before: A system whose records are kept where the data are the same.
         read_value: Reads the values that are known when the system starts; `None` for samples.
+        ros_arguments: The arguments after `--ros-args` of the command line.
 
     Raises:
         UsageError: The words do not fit the arguments that the file declares, or a setting fits
@@ -64,7 +66,8 @@ def load_system(
     """
     confidential.begin([path, *layers])
     document = apply_set_values(_read([path, *layers], text), set_values)
-    return _load(document, path, partial(values_from_words, words=words), before, read_value)
+    give_values = partial(values_from_words, words=words)
+    return _load(document, path, give_values, before, read_value, ros_arguments)
 
 
 def load_combinations(
@@ -133,8 +136,10 @@ def _load(
     give_values: GiveValues,
     before: LoadedSystem | None = None,
     read_value: ReadValue | None = None,
+    ros_arguments: Sequence[str] = (),
 ) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
+    system.ros_arguments = ros_arguments
     system.start.read = read_value
     if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
         # What is wrong with it would tell what is in it.

@@ -3,11 +3,12 @@
 Every record carries the path of its data, under which a `SourceMap` knows where it was written.
 `warn_after_sec` is how long a behaviour may run before it is reported, `None` for ever.
 `local_delivery` is whether messages, calls or goals may be handed over within the process.
+`by_parameter` has the values that follow parameters of the node, by their keys in the file.
 """
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, replace
+from dataclasses import KW_ONLY, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
@@ -82,6 +83,21 @@ class BehaviourSpec:
 
 
 @record
+class ParameterReference:
+    """A value that follows a parameter of its node.
+
+    Attributes:
+        format: The text in which the value stands for `{}`.
+        scale: What a number is multiplied by.
+    """
+
+    parameter: str
+    format: str
+    scale: float
+    path: DataPath
+
+
+@record
 class QosSpec:
     """QoS as written: a profile's name and the policies that differ from it.
 
@@ -137,6 +153,7 @@ class PublisherSpec:
     local_delivery: bool
     external: bool
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -177,6 +194,7 @@ class SubscriptionSpec:
     external: bool
     warn_after_sec: float | None
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -198,6 +216,7 @@ class TimerSpec:
     on_error: OnError
     warn_after_sec: float | None
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -239,6 +258,7 @@ class ServiceSpec:
     on_error: OnError
     warn_after_sec: float | None
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -257,6 +277,7 @@ class ServiceClientSpec:
     local_delivery: bool
     external: bool
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -277,6 +298,7 @@ class ActionSpec:
     on_error: OnError
     warn_after_sec: float | None
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 @record
@@ -297,6 +319,7 @@ class ActionClientSpec:
     local_delivery: bool
     external: bool
     path: DataPath
+    by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
 
 # What meets others of its kind under a name.
@@ -572,6 +595,7 @@ class NodeSpec:
         wait_for: What must be there before it starts.
         delay_sec: Time between the moment when its conditions hold and its start.
         parameter_files: In ROS's own format; later ones win.
+        followed: The parameters that values of its entities, or their number, follow.
         lifecycle: The state to which a node with a lifecycle brings itself; `None` for one
             without.
         bond: Whether it keeps a bond while it is active.
@@ -623,6 +647,7 @@ class NodeSpec:
     wait_for: tuple[ConditionSpec, ...]
     delay_sec: float
     parameter_files: tuple[ParameterFileSpec, ...]
+    followed: tuple[str, ...]
     path: DataPath
 
     @property

@@ -13,6 +13,7 @@ from composer.language.specs import (
     ConditionSpec,
     ExitActionSpec,
     ParameterFileSpec,
+    ParameterReference,
     QosSpec,
 )
 from composer.names import expand_name
@@ -92,7 +93,8 @@ def compare_fields(old: Reading, new: Reading, names: Iterable[str]) -> Iterator
                 resolved = map(resolve_qos, (before, after), profiles)
                 yield from compare_entries(old, new, name, *resolved)
         elif isinstance(before, Mapping):
-            yield from compare_entries(old, new, name, before, after)
+            compare = _compare_references if name == 'by_parameter' else compare_entries
+            yield from compare(old, new, name, before, after)
         elif _differ(plain := _plain(before, name), plain_after := _plain(after, name)):
             if name in _CHANNELS and _expand(old, before) == _expand(new, after):
                 continue
@@ -108,6 +110,16 @@ def compare_entries(
     for key in dict.fromkeys([*before, *after]):
         if (key in before) != (key in after) or _differ(before[key], after[key]):
             yield _change(old, new, f'{name}.{key}', before.get(key), after.get(key))
+
+
+def _compare_references(
+    old: Reading, new: Reading, _: str, before: Mapping[str, Any], after: Mapping[str, Any]
+) -> Iterator[Change]:
+    """Yield what follows another parameter now, or in another way."""
+    for key in dict.fromkeys([*before, *after]):
+        was, now = _plain(before.get(key)), _plain(after.get(key))
+        if was != now:
+            yield _change(old, new, f'{key}.parameter', was, now)
 
 
 def _compare_behaviours(old: Reading, new: Reading, name: str) -> Iterator[Change]:
@@ -147,6 +159,8 @@ def _plain(value: Any, name: str = '') -> Any:
         return f'{value.kind} {value.name}{state} within {value.timeout_sec:g} s'
     if isinstance(value, ExitActionSpec):
         return _plain_action(value)
+    if isinstance(value, ParameterReference):
+        return f'{value.parameter} {value.format} {value.scale:g}'.removesuffix(' {} 1')
     if isinstance(value, ParameterFileSpec):
         return _plain_file(value)
     return value

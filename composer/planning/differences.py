@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 # Nothing that runs depends on these, they tell apart what is compared, or they are compared apart.
 _NOT_COMPARED = {
     *('path', 'name', 'namespace', 'external', 'parameter_files', 'state', 'components'),
-    *('nodes', 'declares_all_ends'),
+    *('nodes', 'declares_all_ends', 'followed'),
     # The part of a host has other nodes and processes then; one that runs all of them does not
     # care.
     'host',

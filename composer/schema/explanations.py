@@ -252,7 +252,8 @@ def _explain_alternatives(error: ValidationError) -> Iterator[Violation]:
             for inner in inner_errors:
                 yield from explain(inner)
             return
-        expected.append(_describe_mismatch(mismatch))
+        if not str(mismatch.schema.get('title')).endswith('by parameter'):
+            expected.append(_describe_mismatch(mismatch))
     yield wrong_type(error, ' or '.join(dict.fromkeys(expected)))
 
 

@@ -23,6 +23,7 @@ ENTRY = re.compile(r"write '(\w+: \w+)'(?: if .*)?")
 # The rules with a help that is for people to read, or names a text for another place.
 FOR_PEOPLE = {
     'after-the-end', 'bad-answer', 'bad-name', 'bad-node-interface', 'bad-parameter-file', 'bad-remap',
+    'bad-parameter-reference',
     'bad-separator', 'bad-system-argument', 'bad-variable', 'bad-when',
     'big-crossing-message', 'blocked-group', 'conflicting-domains', 'conflicting-hosts',
     'conflicting-keys', 'conflicting-types', 'duplicate-constant', 'duplicate-field',

@@ -201,6 +201,7 @@ def _check_unused(
         open_kinds = _open_kinds(node, uses, are_read=are_read)
         names = {(use.kind, use.name) for each in uses for use in each.uses}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
+        names |= {('parameter', name) for name in node.followed}
         names |= set(_meant(node, names))
         mentions = [context.behaviours.mentions(each) for each in uses]
         mentioned = set().union(*(each.names for each in mentions))

@@ -18,6 +18,7 @@ from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
 from composer.language.loaded_system import LoadedSystem
+from composer.language.namespaces import join_namespaces
 from composer.language.values.start_values import StartValues
 from composer.yaml_text.reader import read_document
 
@@ -97,14 +98,15 @@ class Includer:
                 break
             self._inclusions += not aside
             self._check_size(entry)
-            part = self._read(entry, stack, is_left_out=aside)
+            namespace = entry.find_namespace()
+            part = self._read(entry, namespace, stack, is_left_out=aside)
             if part is None:
                 system.dropped.add(entry.at)
                 continue
             system.diagnostics += _found_in(part, entry)
             if entry.is_left_out:
                 part.leave_out_all()
-            merger.add(Inclusion(part, entry, entry.find_namespace()))
+            merger.add(Inclusion(part, entry, namespace))
             brought = 1 + sum(len(part.entries.get(each, ())) for each in SECTIONS)
             self._merged_values += len(part.positions.values)
             if aside:
@@ -133,7 +135,7 @@ class Includer:
         raise _TooLargeError([finding])
 
     def _read(
-        self, entry: IncludeEntry, stack: tuple[str, ...], *, is_left_out: bool
+        self, entry: IncludeEntry, namespace: str, stack: tuple[str, ...], *, is_left_out: bool
     ) -> LoadedSystem | None:
         """Return what an include brings; report it if nothing can be read, and return `None`."""
         path = entry.find_file()
@@ -148,6 +150,8 @@ class Includer:
             entry.report('too-deep', message)
             return None
         part = LoadedSystem.of(self._document(path, real), path)
+        part.namespace = join_namespaces(entry.system.namespace, namespace)
+        part.ros_arguments = entry.system.ros_arguments
         part.start = StartValues() if is_left_out else entry.system.start
         if 'version' not in part.entries and not may_show_lines(real):
             # What is wrong with it would tell what is in it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -14,6 +15,7 @@ from composer.language.parsing.entry_parser import (
     parse_entity_qos,
     parse_entries,
 )
+from composer.language.parsing.parameter_references import take_references
 from composer.language.specs import (
     DEFAULT_WARN_AFTER_SEC,
     ActionClientSpec,
@@ -42,14 +44,18 @@ _USUAL_OVERRIDES = ('history', 'depth', 'reliability')
 def parse_entities(node: Data, path: DataPath) -> dict[str, Any]:
     """Return the specs of all entities of a node, by section and name."""
     return {
-        section: parse_entries(node, path, section, partial(parse, node))
-        for section, parse in _PARSERS.items()
+        section: parse_entries(node, path, section, partial(parse_entity, section, node))
+        for section in _PARSERS
     }
 
 
 def parse_entity(section: str, node: Data, name: str, data: Any, path: DataPath) -> Any:
     """Return the spec of one entity of a node."""
-    return _PARSERS[section](node, name, data, path)
+    if section == 'parameters' or not isinstance(data, dict):
+        return _PARSERS[section](node, name, data, path)
+    data, references = take_references(name, data, path)
+    spec = _PARSERS[section](node, name, data, path)
+    return replace(spec, by_parameter=references) if references else spec
 
 
 class RunOptions(TypedDict):

@@ -35,6 +35,7 @@ def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
         wait_for=parse_conditions(data, path),
         delay_sec=float(data.get('delay', 0.0)),
         parameter_files=parse_parameter_files(data),
+        followed=(),
         path=path,
         **{key: data[key] for key in _PLAIN_KEYS if key in data},
         **_parse_hooks(data, path),

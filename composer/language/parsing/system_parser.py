@@ -16,6 +16,7 @@ from composer.language.parsing.container_parser import (
 )
 from composer.language.parsing.entry_parser import Data, Spec, parse_entries, parse_qos
 from composer.language.parsing.node_parser import parse_node
+from composer.language.parsing.parameter_references import fill_in
 from composer.language.parsing.process_parser import parse_process
 from composer.language.parsing.worker_parser import (
     create_host_finder,
@@ -77,7 +78,7 @@ def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> Non
     system.data = used
     _drop_inherited_hosts(system)
     system.filled = _fill(system, used, system.start, system.sampled)
-    system.spec = parse_system(system.filled, name, before)
+    system.spec = fill_in(system, parse_system(system.filled, name, before))
 
 
 def _fill(

@@ -17,9 +17,11 @@ from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
 
 from composer.errors import StartError
+from composer.language.parsing.parameter_references import find_value_problem
 from composer.ros_parameters.parameter_types import INT64_MAX, INT64_MIN, suggest_value
 from composer.runtime.behaviours.calls import FAILED, return_result
 from composer.runtime.behaviours.running_calls import Owner
+from composer.runtime.entities.timers import Timer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -52,7 +54,7 @@ class NodeParameters:
         self._after: Callable[[list[Parameter]], None] | None = None
         self.specs: dict[str, ParameterSpec] = {}
         self.set_live: set[str] = set()
-        self._refusing = lambda changes: _refuse_unless_chosen(self.specs, changes)
+        self._refusing = lambda changes: _refuse(self.specs, node.spec, changes)
         # The thread that sets parameters to what the files say.
         self._own_thread = 0
         node.ros.add_on_set_parameters_callback(self._refusing)
@@ -161,6 +163,12 @@ class NodeParameters:
     def _note(self, changes: list[Parameter]) -> None:
         if self._own_thread != get_ident():
             self.set_live.update(each.name for each in changes)
+        names = {each.name for each in changes}
+        for name, timer in self._node.spec.timers.items():
+            created = self._node.entities['timers'].get(name)
+            is_followed = any(each.parameter in names for each in timer.by_parameter.values())
+            if is_followed and isinstance(created, Timer):
+                created.follow()
 
 
 def type_of(spec: ParameterSpec) -> Parameter.Type:
@@ -239,12 +247,19 @@ def find_refusal(spec: ParameterSpec, value: Any) -> str:
     return f"'{value}' is not one of {', '.join(map(str, spec.choices))}"
 
 
-def _refuse_unless_chosen(
-    specs: Mapping[str, ParameterSpec], changes: list[Parameter]
+def _refuse(
+    specs: Mapping[str, ParameterSpec], node: NodeSpec, changes: list[Parameter]
 ) -> SetParametersResult:
     for change in changes:
         if (spec := specs.get(change.name)) and (reason := find_refusal(spec, change.value)):
             return SetParametersResult(successful=False, reason=reason)
+        for timer in node.timers.values():
+            for key, reference in timer.by_parameter.items():
+                if reference.parameter == change.name and (
+                    problem := find_value_problem(key, reference, change.value)
+                ):
+                    reason = f"timer '{timer.name}' follows it: {problem}"
+                    return SetParametersResult(successful=False, reason=reason)
     return SetParametersResult(successful=True)
 
 

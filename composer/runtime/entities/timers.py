@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.clock import Clock, ClockType
 
 from composer.interfaces.classes import import_interface
+from composer.language.parsing.parameter_references import period_of
 from composer.python_source.function_kinds import FunctionKind
 from composer.runtime.behaviours.callables import kind_of
 from composer.runtime.behaviours.running_calls import Owner
@@ -36,10 +37,11 @@ class Timer:
     def __init__(self, node: LiveNode, spec: TimerSpec) -> None:
         self._node = node
         self._owner = Owner('timer', spec.name)
-        self._period_sec = spec.period_sec
+        self._spec = spec
+        self._period_sec = self._find_period(spec)
         self._ticker = _Ticker(node, self._owner, spec)
         self.ros = node.ros.create_timer(
-            spec.period_sec,
+            self._period_sec,
             self._create_callback(spec),
             callback_group=node.group(spec.group),
             clock=_create_clock(spec.clock),
@@ -57,12 +59,24 @@ class Timer:
             self._ticker = _Ticker(self._node, self._owner, spec)
             self._ticker.timer = self.ros
         self.ros.callback = self._create_callback(spec)
-        if spec.period_sec != self._period_sec:
-            self._period_sec = spec.period_sec
-            self.ros.timer_period_ns = round(spec.period_sec * 1e9)
+        self._spec = spec
+        self.follow()
+
+    def follow(self) -> None:
+        """Take the period that the file, or the parameter that it follows, says now."""
+        period_sec = self._find_period(self._spec)
+        if period_sec != self._period_sec:
+            self._period_sec = period_sec
+            self.ros.timer_period_ns = round(period_sec * 1e9)
             if not self.ros.is_canceled():
                 # A generator that has ended has cancelled it.
                 self.ros.reset()
+
+    def _find_period(self, spec: TimerSpec) -> float:
+        for key, reference in spec.by_parameter.items():
+            value = self._node.ros.get_parameter(reference.parameter).value
+            return period_of(key, reference, value)
+        return spec.period_sec
 
     def destroy(self) -> None:
         """See `LiveEntity`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.checks.parameters import OF_EVERY_NODE, find_nearest_choice, find_refusal
+from composer.language.parsing.parameter_references import listed_parameters
 from composer.ros_parameters.parameter_types import convert_parameter_value, find_type_problem
 from composer.scenarios.checks.scenario_context import suggest_full_name
 from composer.scenarios.checks.time_checks import value_at
@@ -59,6 +60,10 @@ def check_given_parameters(
             declared = node.parameters.get(parameter)
             if declared is None:
                 yield from _check_undeclared(context, node, parameter, at)
+            elif not may_be_refused and parameter in listed_parameters(node):
+                message = f"entities are repeated for the values of '{parameter}'"
+                help_text = 'give it in a layer of the system: the file is read with its values'
+                yield context.at_key(at, 'refused-parameter', message, help=help_text)
             elif not may_be_refused:
                 yield from _check_value(context, declared, value, at)
 

@@ -8,7 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
+from composer.language.parsing.parameter_references import with_values
 from composer.language.specs import ParameterFileSpec
+from composer.language.values.parameter_values import StartingValues
 from composer.recordings.reading import read_recording
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
@@ -191,7 +193,8 @@ def _with_values(node: NodeSpec, values: Mapping[str, Any]) -> NodeSpec:
         with os.fdopen(handle, 'w', encoding='utf-8') as file:
             file.write(render_parameter_file({node.full_name: typed}))
         files = (*files, ParameterFileSpec(path))
-    return replace(node, parameters=parameters, parameter_files=files)
+    given = replace(node, parameters=parameters, parameter_files=files)
+    return with_values(given, StartingValues(()).of_node(given))
 
 
 def _write_trace(path: str, simulated: SimulatedSystem) -> None:

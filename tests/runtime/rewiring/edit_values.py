@@ -19,7 +19,8 @@ _TYPES = ['std_msgs/msg/String', 'std_msgs/msg/Header', 'nowhere/msg/Wrong', 'St
 _INTROSPECTION = ['metadata', 'contents', 'off', 'all', None]
 _OVERRIDES = [True, ['depth', 'deadline'], ['dept'], None]
 _EVENT = ['parts:notice', 'parts:notice_later', 'parts:notce', None]
-_TOPIC = ['out', 'far', '/away', '~/own', 'bad name', None]
+_BY_NAME = {'parameter': 'name', 'format': '/{}/x'}
+_TOPIC = ['out', _BY_NAME, 'far', '/away', '~/own', 'bad name', None]
 _QOS = [None, 5, 'near', 'sensor_data', 'nearest', {'depth': 7}, {'dept': 1}]
 _TRIGGERS = ['std_srvs/srv/Trigger', 'std_srvs/srv/Empty', 'std_srvs/srv/Trager']
 _ACTIONS = ['test_msgs/action/Fibonacci', 'test_msgs/action/NestedMessage', 'a/action/B']
@@ -70,7 +71,7 @@ VALUES = {
     'system.qos': [{'near': {'depth': 4}}, {'far': {'depth': 1}}, {'near': {'depth': 3}}, None],
     'qos_profile.profile': ['sensor_data', 'near', 'nowhere', None],
     'qos_profile.history': ['keep_last', 'keep_all', 'keep_some', None],
-    'qos_profile.depth': [1, 20, 0, None],
+    'qos_profile.depth': [1, 20, 0, {'parameter': 'limit'}, None],
     'qos_profile.reliability': ['reliable', 'best_effort', 'maybe', None],
     'qos_profile.durability': ['volatile', 'transient_local', 'for_ever', None],
     'qos_profile.deadline': [2.0, 'infinite', -1.0, None],
@@ -196,10 +197,16 @@ VALUES = {
     'subscription.on_error': _ON_ERROR,
     'subscription.warn_after': _WARN_AFTER,
     'node.timers': [{'tick': _TICK}, {'tick': {**_TICK, 'with': {'text': 'n'}}}, {}, None],
+    **{
+        f'{kind}_by_parameter.parameter': ['limit', 'name', 'nothing', None]
+        for kind in ('value', 'number', 'text')
+    },
+    'number_by_parameter.scale': [2, 0.5, 0, None],
+    'text_by_parameter.format': ['{}/y', '/{}', 'none', None],
     'timer.foreach': _FOREACH,
     'timer.when': _WHEN,
     'timer.period': [0.02, 0.05, 0.08, 100.0, '{{ 1 / 40 }}', -1.0, None],
-    'timer.rate': [50, 25.0, 0, None],
+    'timer.rate': [50, 25.0, 0, {'parameter': 'limit', 'scale': 5}, {'parameter': 'x'}, None],
     'timer.behaviour': [
         *('parts:tick', 'parts:steps', 'parts:few_steps', 'parts:tick_later', 'parts:ticking'),
         *('parts:steps_later', 'peer:tick', 'parts:tock', 'absent:tick', None),
