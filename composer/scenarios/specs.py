@@ -6,14 +6,16 @@ actions and nodes are full names. Every `path` leads to the place in the file.
 
 from __future__ import annotations
 
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
+    from composer.language.specs import NodeSpec
     from composer.yaml_text.positions import DataPath
 
 GoalStatus: TypeAlias = Literal['succeeded', 'aborted', 'canceled', 'rejected']
@@ -220,6 +222,44 @@ class ActionStandInSpec:
 
 
 @record
+class SourceValueSpec:
+    """A value that a source brings.
+
+    Attributes:
+        value: What its behaviour would return.
+    """
+
+    schedule: ScheduleSpec
+    value: Any
+    path: DataPath
+
+
+@record
+class SourceInputSpec:
+    """What a source brings.
+
+    Attributes:
+        name: As written: that of the source, or of its node and the source, `driver/port`.
+        recording: A file that has messages of its topic, or `None`.
+    """
+
+    name: str
+    values: tuple[SourceValueSpec, ...]
+    recording: Path | None
+    path: DataPath
+
+
+def find_sources(nodes: Iterable[NodeSpec], name: str) -> list[tuple[NodeSpec, str]]:
+    """Return the nodes that have a source of a name as a case writes it, and its own name."""
+    owner, _, source = name.rpartition('/')
+    return [
+        (node, source)
+        for node in nodes
+        if source in node.sources and owner in ('', node.key, node.full_name)
+    ]
+
+
+@record
 class GivenSpec:
     """What a case starts from.
 
@@ -228,6 +268,9 @@ class GivenSpec:
         recording: A file whose messages are published at their times, or `None`.
         services: Stand-ins by full names of services.
         actions: Stand-ins by full names of actions.
+        sources: What sources bring.
+        replace: The objects that are put in the place of others, by the names of these, both as
+            `module:name`.
     """
 
     parameters: ValuesByNode
@@ -235,6 +278,8 @@ class GivenSpec:
     services: Mapping[str, ServiceStandInSpec]
     actions: Mapping[str, ActionStandInSpec]
     path: DataPath
+    sources: tuple[SourceInputSpec, ...] = ()
+    replace: Mapping[str, str] = field(default_factory=dict)
 
 
 @record

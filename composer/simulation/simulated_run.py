@@ -47,6 +47,7 @@ class SimulatedRun(System):
     Args:
         observe: Takes what happens.
         on_created: Called when there are all nodes, and none of their behaviours has been called.
+        begins_source: Returns whether a source of a node runs as it is.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class SimulatedRun(System):
         threads: SimulatedThreads,
         observe: Observe,
         on_created: Callable[[], None],
+        begins_source: Callable[[str, str], bool],
     ) -> None:
         self._threads = threads
         self._on_created = on_created
@@ -63,6 +65,7 @@ class SimulatedRun(System):
         self._control = self._hang_watcher = self._graph_watcher = nothing
         self._parameter_services = nothing
         self._handle.observe = observe
+        self._handle.begins_source = begins_source
         self._tapped: WeakSet[Publisher] = WeakSet()
         self._handle.topics.tap(self._tap)
 

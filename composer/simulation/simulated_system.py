@@ -23,7 +23,11 @@ from composer.runtime.environment import environment_set
 from composer.runtime.rewiring.reading import Reading
 from composer.simulation.events import Event
 from composer.simulation.missed_deadlines import MissedDeadlines
-from composer.simulation.project_modules import forgotten_modules, list_project_modules
+from composer.simulation.project_modules import (
+    forgotten_modules,
+    list_project_modules,
+    replaced_objects,
+)
 from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
 from composer.simulation.simulated_run import ObservedLog, SimulatedRun, without_processes
 from composer.virtual_time.clocks import to_ns
@@ -32,7 +36,7 @@ from composer.virtual_time.ros_clocks import simulated_clocks
 from composer.virtual_time.simulated_threads import SimulatedThreads
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping
     from types import SimpleNamespace
 
     from composer.language.loaded_system import LoadedSystem
@@ -69,6 +73,9 @@ class SimulatedSystem:
     Attributes:
         system: The one that it was given.
         events: What has happened, if `on_event` was not given.
+        played: Nodes and sources that only bring what `bring` gives them.
+        replaced: Objects to put in the place of others, by the names of these, as `module:name`.
+            With any, sources that are not played run as they are.
     """
 
     def __init__(
@@ -99,6 +106,8 @@ class SimulatedSystem:
         self._node: ScenarioNode | None = None
         self._watch: Watch | None = None
         self._deadlines: MissedDeadlines | None = None
+        self.played: Collection[tuple[str, str]] = ()
+        self.replaced: Mapping[str, str] = {}
         self._prepared: list[Callable[[ScenarioNode], None]] = []
         self._messages: defaultdict[str, list[Any]] = defaultdict(list)
 
@@ -168,8 +177,14 @@ class SimulatedSystem:
         self._watch = stack.enter_context(replaced(threads, self._start_time_ns, self._seed))
         stack.enter_context(simulated_clocks(threads, self._start_time_ns))
         with threads.entered():
-            self._run = SimulatedRun(self._read(), threads, self._observe, self._on_created)
+            self._run = SimulatedRun(
+                self._read(), threads, self._observe, self._on_created, self._begins_source
+            )
         stack.enter_context(self._run.observed_publishers())
+
+    def _begins_source(self, node: str, source: str) -> bool:
+        """Return whether a source runs as it is: without other objects there is no device."""
+        return bool(self.replaced) and (node, source) not in self.played
 
     def _on_created(self) -> None:
         nodes = self._running.nodes
@@ -191,6 +206,7 @@ class SimulatedSystem:
         folders = project_search_path(self.system.files)
         self._stack.enter_context(project_on_path(folders))
         before = self._stack.enter_context(forgotten_modules(folders))
+        self._stack.enter_context(replaced_objects(self.replaced, folders, before))
         functions, _findings = import_behaviours(context, context.spec)
         if self._watch is not None:
             for path in list_project_modules(folders, before).values():
@@ -273,6 +289,26 @@ class SimulatedSystem:
         """
         with self._threads.entered():
             self._started_node.publish(topic, payload, type)
+
+    def bring(self, node: str, source: str, payload: Any) -> None:
+        """Have a source bring what its behaviour would return; a node without it does nothing.
+
+        Args:
+            node: The full name of its node.
+        """
+        with self._threads.entered():
+            if (entity := self._entities(node, 'sources').get(source)) is not None:
+                entity.play(payload)
+
+    def topic_of_source(self, node: str, source: str) -> str:
+        """Return the full name of the topic that a source publishes on; empty for none."""
+        entity = self._entities(node, 'sources').get(source)
+        publisher = self._entities(node, 'publishers').get(entity.publisher if entity else '')
+        return str(publisher.ros.topic_name) if publisher else ''
+
+    def _entities(self, node: str, section: str) -> Mapping[str, Any]:
+        owner = self._running.nodes.get(node)
+        return owner.entities[section] if owner else {}
 
     def call(
         self,

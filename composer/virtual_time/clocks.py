@@ -61,6 +61,9 @@ def _clock(
     target = ReplacedFunction(builtin)
     # Each callback reads the time several times.
     original, by_ident = target.original, threads.by_ident
+    # Deadlines of waits are computed from it, and would drift.
+    is_exact = 'monotonic' in builtin.__name__
+    clock = builtin.__name__.removesuffix('_ns')
     get_ident = REAL.get_ident
 
     def read_ns() -> Any:
@@ -70,7 +73,7 @@ def _clock(
         thread.looks += 1
         if thread.looks > MOST_LOOKS:
             threads.let_time_pass(thread)
-        return start_ns + threads.now_ns
+        return start_ns + (threads.now_ns if is_exact else threads.read_ns(clock))
 
     def read_sec() -> Any:
         thread = by_ident.get(get_ident()) or threads.mine()
@@ -79,7 +82,7 @@ def _clock(
         thread.looks += 1
         if thread.looks > MOST_LOOKS:
             threads.let_time_pass(thread)
-        return (start_ns + threads.now_ns) / divisor
+        return (start_ns + (threads.now_ns if is_exact else threads.read_ns(clock))) / divisor
 
     return target, read_ns if divisor == 1 else read_sec
 

@@ -46,7 +46,7 @@ class SimulatedClock(ROSClock):
         thread = self.threads.mine()
         if thread is not None:
             self.threads.count_look(thread)
-        now_ns = self.start_ns + self.threads.now_ns
+        now_ns = self.start_ns + self.threads.read_ns(_key(self))
         return Time(nanoseconds=now_ns, clock_type=ClockType.ROS_TIME)
 
     def set_ros_time_override(self, time: Time) -> None:
@@ -97,14 +97,17 @@ def _replacements(
         threads.count_look(thread)
         is_steady = self.clock_type is ClockType.STEADY_TIME
         start_ns = MONOTONIC_START_NS if is_steady else simulated.start_ns
-        return Time(nanoseconds=start_ns + threads.now_ns, clock_type=self.clock_type)
+        now_ns = start_ns + threads.read_ns(_key(self))
+        return Time(nanoseconds=now_ns, clock_type=self.clock_type)
 
     def sleep_virtually(self: Any, until: Time, context: Any = None) -> bool:
         if threads.mine() is None:
             return bool(sleep_until(self, until, context))
-        left: Duration = until - self.now()
-        if left.nanoseconds > 0:
-            threads.sleep(left.nanoseconds)
+        now: Time = self.now()
+        # As long as is asked for: the clock has shown a nanosecond more.
+        left_ns = until.nanoseconds - now.nanoseconds + threads.ahead_ns(_key(self))
+        if left_ns > 0:
+            threads.sleep(left_ns)
         return True
 
     def create_timer_on(
@@ -120,6 +123,11 @@ def _replacements(
     yield Clock, 'now', now_virtually
     yield Clock, 'sleep_until', sleep_virtually
     yield rclpy.timer.Timer, '__init__', create_timer_on
+
+
+def _key(clock: Any) -> str:
+    """Return what `SimulatedThreads` knows a clock by."""
+    return str(clock.clock_type.name)
 
 
 def _waits_in_steps(threads: SimulatedThreads, wait: Any) -> Callable[..., None]:

@@ -86,6 +86,7 @@ class SimulatedThreads:
 
     def __init__(self, shuffle: Random | None = None, limit_sec: float = 30.0) -> None:
         self.now_ns = 0
+        self._read_ns: dict[str, int] = {}
         self.current: SimulatedThread | None = None
         self.on_advance: Callable[[int], None] = lambda _now_ns: None
         self.turns = 0
@@ -116,6 +117,18 @@ class SimulatedThreads:
             message = 'what comes next is looked for in real time'
             raise RuntimeError(message)
         return thread
+
+    def read_ns(self, clock: str) -> int:
+        """Return what a clock says: a nanosecond more than before if no time has passed.
+
+        Real clocks never say the same twice, and libraries divide by the difference.
+        """
+        self._read_ns[clock] = now_ns = max(self.now_ns, self._read_ns.get(clock, -1) + 1)
+        return now_ns
+
+    def ahead_ns(self, clock: str) -> int:
+        """Return how far what a clock has just shown is ahead of what it showed before; 0 or 1."""
+        return int(self._read_ns.get(clock, 0) > self.now_ns)
 
     @contextmanager
     def entered(self) -> Iterator[None]:

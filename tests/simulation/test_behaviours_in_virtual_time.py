@@ -65,10 +65,10 @@ CASES = {
             before = [each.now() for each in clocks]
             time.sleep(0.25)
             passed = [(b.now() - a).nanoseconds for a, b in zip(before, clocks)]
-            node.logger.info(str([
-                time.monotonic() - first[0], time.time_ns() - first[1],
-                node.now().nanoseconds - first[2], *passed,
-            ]))
+            # Each look at a clock takes a nanosecond.
+            node.logger.info(str([time.monotonic() - first[0], *(round(each, -3) for each in (
+                time.time_ns() - first[1], node.now().nanoseconds - first[2], *passed,
+            ))]))
             clocks[0].sleep_for(rclpy.duration.Duration(seconds=0.25))
             clocks[1].sleep_until(clocks[1].now() + rclpy.duration.Duration(seconds=0.25))
             node.ros.get_clock().sleep_for(rclpy.duration.Duration(seconds=0.25))

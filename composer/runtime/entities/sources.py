@@ -60,8 +60,8 @@ class Source:
         self.is_generator = kind is FunctionKind.GENERATOR
 
     def reset(self) -> None:
-        """Begin, if it has not begun; in virtual time there is no device to wait for."""
-        if self._node.system.observe is not None:
+        """Begin, if it has not begun; in virtual time there may be no device to wait for."""
+        if not self._node.system.begins_source(self._node.full_name, self.owner.name):
             return
         with self._lock:
             if self._reader is None:
@@ -116,6 +116,24 @@ class Source:
             deliver=node.publish_to(spec.publish),
             may_begin=node.gate.allows_events,
         )
+
+    @property
+    def publisher(self) -> str:
+        """The name of the publisher for what it brings; empty for none."""
+        return self._spec.publish or ''
+
+    def play(self, value: Any) -> None:
+        """Bring a value, as if the behaviour had returned it."""
+        spec, node = self._spec, self._node
+        deliver, may_begin = node.publish_to(spec.publish), node.gate.allows_events
+        node.call(
+            self.owner,
+            spec.path,
+            lambda: value,
+            options=spec,
+            deliver=deliver,
+            may_begin=may_begin,
+        ).run()
 
     def close_generator(self, generator: Any) -> None:
         """Run what a generator has in `finally:`; what that raises is reported."""

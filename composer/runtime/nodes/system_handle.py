@@ -70,6 +70,7 @@ class SystemHandle:
         create_entity: Creates one entity more of a `LiveNode`, of a section, from its record.
         observe: Takes what happens, with a kind of `Event`, a node, a name and a value; `None` if
             nobody wants to know.
+        begins_source: Returns whether a source of a node begins, and nothing is played instead.
         is_outdated: Returns whether a reload is waited for in vain, as there is a newer edit.
         health: The health of the system's entities.
         topics: Hands messages over between its nodes.
@@ -93,6 +94,7 @@ class SystemHandle:
     elsewhere: Elsewhere
     create_entity: Callable[[Any, str, Any], LiveEntity]
     observe: Observe | None = None
+    begins_source: Callable[[str, str], bool] = lambda _node, _source: True
     is_outdated: Callable[[], bool] = never
     health: HealthRegistry = field(default_factory=HealthRegistry)
     lost: LostParticipants = field(default_factory=LostParticipants)

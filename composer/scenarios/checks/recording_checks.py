@@ -47,18 +47,25 @@ def check_recording_of_case(
 def check_like(context: ScenarioContext, expected: LikeExpectationSpec) -> Iterator[Diagnostic]:
     """Check that a recording has the topic that it is compared with, of the same type."""
     path = (*expected.path, 'like')
-    content = yield from _read(context, expected.recording, path)
+    yield from check_recorded(context, expected.recording, path, expected.topic)
+
+
+def check_recorded(
+    context: ScenarioContext, recording: Path, path: DataPath, topic: str
+) -> Iterator[Diagnostic]:
+    """Check that a recording has a topic of the system, of the same type."""
+    content = yield from _read(context, recording, path)
     if content is None:
         return
     types = {each.name: each.type for each in content.topics}
-    if expected.topic not in types:
-        message = f'{expected.recording} has no messages of {expected.topic}'
-        help_text = suggest(expected.topic, types, 'it has')
+    if topic not in types:
+        message = f'{recording} has no messages of {topic}'
+        help_text = suggest(topic, types, 'it has')
         yield context.at_value(path, _RULE, message, help=help_text)
         return
-    known = context.type_of('topic', expected.topic)
-    if known is not None and known != types[expected.topic]:
-        yield _conflict(context, path, expected.topic, types[expected.topic], known)
+    known = context.type_of('topic', topic)
+    if known is not None and known != types[topic]:
+        yield _conflict(context, path, topic, types[topic], known)
 
 
 def _conflict(

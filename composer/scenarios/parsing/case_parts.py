@@ -9,7 +9,10 @@ from composer.scenarios.specs import (
     ActionStandInSpec,
     FeedbackSpec,
     GivenSpec,
+    ScheduleSpec,
     ServiceStandInSpec,
+    SourceInputSpec,
+    SourceValueSpec,
     WindowSpec,
 )
 from composer.scenarios.times import to_nanoseconds
@@ -43,8 +46,28 @@ def parse_given(
         recording=find_recording(data['recording']) if 'recording' in data else None,
         services={each.service: each for each in services},
         actions={each.action: each for each in actions},
+        sources=tuple(
+            _parse_source(name, entry, (*path, 'sources', name), find_recording)
+            for name, entry in data.get('sources', {}).items()
+        ),
+        replace=data.get('replace', {}),
         path=path,
     )
+
+
+def _parse_source(
+    name: str,
+    data: str | list[dict[str, Any]],
+    path: DataPath,
+    find_recording: Callable[[str], Path],
+) -> SourceInputSpec:
+    if isinstance(data, str):
+        return SourceInputSpec(name, (), find_recording(data), path)
+    values = (
+        SourceValueSpec(parse_schedule(each), each['value'], (*path, index))
+        for index, each in enumerate(data)
+    )
+    return SourceInputSpec(name, tuple(values), None, path)
 
 
 def parse_service_stand_in(
@@ -83,6 +106,16 @@ def parse_action_stand_in(name: str, data: Mapping[str, Any], path: DataPath) ->
 def parse_values(data: Mapping[str, Mapping[str, Any]], names: NameReader) -> ValuesByNode:
     """Return values by full names of nodes."""
     return {names.node(node): values for node, values in data.items()}
+
+
+def parse_schedule(data: Mapping[str, Any]) -> ScheduleSpec:
+    """Return when a step is done, or a value is brought."""
+    every = data.get('every')
+    return ScheduleSpec(
+        at_ns=to_nanoseconds(data.get('at', 0)),
+        every_ns=None if every is None else to_nanoseconds(every),
+        times=None if 'times' not in data else int(data['times']),
+    )
 
 
 def parse_window(data: Mapping[str, Any], key: str = 'within') -> WindowSpec:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from composer.scenarios.parsing.case_parts import parse_values
+from composer.scenarios.parsing.case_parts import parse_schedule, parse_values
 from composer.scenarios.parsing.full_names import absolute
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
     PublishStepSpec,
-    ScheduleSpec,
     SetParametersStepSpec,
 )
 from composer.scenarios.times import to_nanoseconds
@@ -29,7 +28,7 @@ def parse_step(data: Mapping[str, Any], path: DataPath, names: NameReader) -> St
     """Return a step."""
     if 'set_parameters' in data:
         return SetParametersStepSpec(
-            schedule=_parse_schedule(data),
+            schedule=parse_schedule(data),
             values=parse_values(data['set_parameters'], names),
             atomically=data.get('atomically', False),
             refused=data.get('refused', False),
@@ -39,18 +38,9 @@ def parse_step(data: Mapping[str, Any], path: DataPath, names: NameReader) -> St
     return _VERBS[verb](data, path)
 
 
-def _parse_schedule(data: Mapping[str, Any]) -> ScheduleSpec:
-    every = data.get('every')
-    return ScheduleSpec(
-        at_ns=to_nanoseconds(data.get('at', 0)),
-        every_ns=None if every is None else to_nanoseconds(every),
-        times=None if 'times' not in data else int(data['times']),
-    )
-
-
 def _parse_publish(data: Mapping[str, Any], path: DataPath) -> PublishStepSpec:
     return PublishStepSpec(
-        schedule=_parse_schedule(data),
+        schedule=parse_schedule(data),
         topic=absolute(data['publish']),
         message=data.get('message', {}),
         type=data.get('type'),
@@ -60,7 +50,7 @@ def _parse_publish(data: Mapping[str, Any], path: DataPath) -> PublishStepSpec:
 
 def _parse_call(data: Mapping[str, Any], path: DataPath) -> CallStepSpec:
     return CallStepSpec(
-        schedule=_parse_schedule(data),
+        schedule=parse_schedule(data),
         service=absolute(data['call']),
         request=data.get('request', {}),
         response=data.get('response'),
@@ -75,7 +65,7 @@ def _parse_call(data: Mapping[str, Any], path: DataPath) -> CallStepSpec:
 def _parse_goal(data: Mapping[str, Any], path: DataPath) -> GoalStepSpec:
     cancel_at = data.get('cancel_at')
     return GoalStepSpec(
-        schedule=_parse_schedule(data),
+        schedule=parse_schedule(data),
         action=absolute(data['send_goal']),
         goal=data.get('goal', {}),
         cancel_at_ns=None if cancel_at is None else to_nanoseconds(cancel_at),

@@ -24,6 +24,7 @@ from composer.scenarios.running.failure_reports import (
     list_log,
 )
 from composer.scenarios.running.recording_input import RecordingInput
+from composer.scenarios.running.source_input import SourceInput
 from composer.scenarios.running.stand_in_servers import StandIns, is_of_stand_in
 from composer.scenarios.specs import ParametersExpectationSpec
 from composer.scenarios.times import NANOSECONDS
@@ -84,6 +85,7 @@ class _CaseRun:
             message = f'{loaded.path}: its system cannot be read'
             raise ComposerError(message)
         given = case.given
+        self._sources = SourceInput(given, loaded.system.spec)
         recording = read_recording(given.recording) if given.recording else None
         self._case = case
         self.simulated_sec = 0.0
@@ -93,11 +95,12 @@ class _CaseRun:
             with_parameters(loaded.system, given.parameters),
             seed=seed,
             is_shuffled=request.shuffle > 0,
-            start_time_ns=recording.start_ns if recording else None,
+            start_time_ns=recording.start_ns if recording else self._sources.start_ns,
             real_limit_sec=_SHARE * (request.real_time_limit_sec or case.real_time_limit_sec),
             shows_log=not request.captures,
         )
         stop_sec = loaded.system.spec.shutdown_timeout_sec if loaded.system.spec else 0.0
+        self.simulated.played, self.simulated.replaced = self._sources.played, given.replace
         self.stand_ins = StandIns(self.simulated, given, stop_sec)
         self.steps = CaseSteps(self.simulated, loaded, case)
         self._input = (
@@ -110,6 +113,7 @@ class _CaseRun:
         try:
             self.stand_ins.serve()
             self.steps.schedule()
+            self._sources.schedule(simulated, case.until_ns)
             if self._input:
                 self._input.schedule()
             try:
