@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from composer.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import FrameType
 
 HANDLED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -64,6 +64,30 @@ def interrupting() -> Iterator[None]:
         raise
     finally:
         _interrupts = False
+
+
+@contextmanager
+def asked_to_stop() -> Iterator[Callable[[], bool]]:
+    """Yield what tells whether a signal has come; the second one ends the process."""
+    asked = False
+
+    def handle(number: int, _frame: Any) -> None:
+        nonlocal asked
+        asked = True
+        signal.signal(number, before[number])
+
+    # As `up`: a script has SIGINT ignored in the background, and `nohup` SIGHUP.
+    heeded = [
+        each
+        for each in HANDLED
+        if each == signal.SIGINT or signal.getsignal(each) is not signal.SIG_IGN
+    ]
+    before: dict[int, Any] = {int(each): signal.signal(each, handle) for each in heeded}
+    try:
+        yield lambda: asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _handle(number: int, _frame: FrameType | None) -> None:

@@ -202,7 +202,7 @@ class GraphRecorder:
                 continue
             ends = self._find_publishers(topic, interface_name(listener.ros.msg_type))
             listener.publishers = max(before, len(ends))
-            asked = _adapt(read_offer(each.qos_profile) for each in ends)
+            asked = match_offers(read_offer(each.qos_profile) for each in ends)
             profile = listener.ros.qos_profile
             if (asked.reliability, asked.durability) != (profile.reliability, profile.durability):
                 self._report(
@@ -230,7 +230,7 @@ class GraphRecorder:
             return
         offers = [read_offer(each.qos_profile) for each in ends]
         channel = self._recorder.open_channel(topic, message_class, offers)
-        profile = _adapt(offers)
+        profile = match_offers(offers)
         ros = self._node.create_subscription(
             message_class, topic, lambda _message: None, profile, raw=True
         )
@@ -266,7 +266,7 @@ def read_offer(profile: QoSProfile) -> dict[str, Any]:
     return policies
 
 
-def _adapt(offers: Iterable[dict[str, Any]]) -> QoSProfile:
+def match_offers(offers: Iterable[dict[str, Any]]) -> QoSProfile:
     """Return what matches all publishers, and asks for as much as all offer, as rosbag2 does.
 
     Source: `Rosbag2QoS::adapt_request_to_offers` in rosbag2_storage (`src/qos.cpp`).

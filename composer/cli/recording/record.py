@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import signal
 import time
-from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from composer.cli.recording.graph_node import Terminal, graph_node
 from composer.errors import ExitCode
+from composer.signals import asked_to_stop
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Sequence
 
 _POLL_SEC = 0.1
 
@@ -33,7 +32,7 @@ def record(output: Path | None, topics: Sequence[str]) -> int:
         ComposerError: The file cannot be written.
     """
     target = output or Path(f'rosbag2_{datetime.now():%Y_%m_%d-%H_%M_%S}')  # noqa: DTZ005 - as rosbag2
-    with _asked_to_stop() as is_asked, graph_node('_composer_record') as node:
+    with asked_to_stop() as is_asked, graph_node('_composer_record') as node:
         # These import rclpy, which the node has found.
         from composer.recordings.graph_recorder import GraphRecorder
         from composer.recordings.recorder import Recorder
@@ -50,28 +49,3 @@ def record(output: Path | None, topics: Sequence[str]) -> int:
         graph.stop()
         recorder.finish(patterns.describe_unused(graph.topics))
         return ExitCode.DONE if recorder.room else ExitCode.FAILED
-
-
-@contextmanager
-def _asked_to_stop() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether a signal has come; the second one ends the process."""
-    asked = False
-
-    def handle(number: int, _frame: Any) -> None:
-        nonlocal asked
-        asked = True
-        signal.signal(number, before[number])
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    # As `up`: a script has SIGINT ignored in the background, and `nohup` SIGHUP.
-    heeded = [
-        each
-        for each in numbers
-        if each == signal.SIGINT or signal.getsignal(each) is not signal.SIG_IGN
-    ]
-    before: dict[int, Any] = {int(each): signal.signal(each, handle) for each in heeded}
-    try:
-        yield lambda: asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.cli.common.argument_types import takes_format
+from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, takes_format
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
 from composer.errors import UsageError
 
@@ -189,8 +189,99 @@ def capture_command(nodes: tuple[str, ...], output: Path | None, timeout_sec: fl
     return capture(nodes, output=output, timeout_sec=timeout_sec)
 
 
+_answer_timeout = click.option(
+    '--timeout',
+    'timeout_sec',
+    type=click.FloatRange(min=0, min_open=True),
+    default=_ANSWER_SEC,
+    show_default=True,
+    metavar='SEC',
+    help='How long to look for it, and to wait for its answer.',
+)
+
+
+def _names(kind: str) -> Callable[..., Any]:
+    """Add the name of what is on the graph to a command; the shell completes it."""
+
+    def complete(_context: click.Context, _argument: click.Parameter, begun: str) -> list[str]:
+        from composer.cli.running.live_values import list_names
+
+        return [each for each in list_names(kind) if each.startswith((begun, f'/{begun}'))]
+
+    return click.argument(kind, shell_complete=complete)
+
+
+@click.command('echo')
+@_names('topic')
+@click.argument('field', default='')
+@click.option('--once', is_flag=True, help='End with the first message.')
+@click.option('--hz', 'tells_rate', is_flag=True, help='Print how many come in a second instead.')
+@_answer_timeout
+def echo_command(
+    topic: str, field: str, timeout_sec: float, *, once: bool, tells_rate: bool
+) -> int:
+    """Print the messages of TOPIC, or FIELD of each, until it is interrupted.
+
+    FIELD is a part of the message, as pose.position.x or ranges[0]. With --once, the exit code is
+    1 if no message comes in time.
+    """
+    from composer.cli.running.live_values import echo
+
+    return echo(topic, field, once=once, tells_rate=tells_rate, timeout_sec=timeout_sec)
+
+
+@click.command('call')
+@_names('service')
+@click.argument('payload', default='')
+@_answer_timeout
+def call_command(service: str, payload: str, timeout_sec: float) -> int:
+    """Call SERVICE with PAYLOAD, and print its answer.
+
+    PAYLOAD is YAML as in a scenario: '{a: 1, b: 2}', or the value alone of a request with one
+    field. What it leaves out has its default.
+    """
+    from composer.cli.running.live_values import call
+
+    return call(service, payload, timeout_sec)
+
+
+@click.command('send-goal')
+@_names('action')
+@click.argument('payload', default='')
+@_answer_timeout
+def send_goal_command(action: str, payload: str, timeout_sec: float) -> int:
+    """Send the goal PAYLOAD to ACTION, and print its feedback and result.
+
+    The result may take as long as it likes; Ctrl-C cancels the goal. If it does not succeed, the
+    exit code is 1.
+    """
+    from composer.cli.running.live_values import send_goal
+
+    return send_goal(action, payload, timeout_sec)
+
+
+@click.command('set', context_settings=NUMBERS_ARE_VALUES)
+@_names('node')
+@click.argument('parameter')
+@click.argument('value')
+@_answer_timeout
+def set_command(node: str, parameter: str, value: str, timeout_sec: float) -> int:
+    """Set PARAMETER of NODE to VALUE, which is YAML.
+
+    NODE is its full name, or what follows the last slash of it. If the node refuses the value, the
+    exit code is 1.
+    """
+    from composer.cli.running.live_values import set_parameter
+
+    return set_parameter(node, parameter, value, timeout_sec)
+
+
 COMMANDS = (
     capture_command,
+    echo_command,
+    call_command,
+    send_goal_command,
+    set_command,
     ps_command,
     top_command,
     logs_command,

@@ -1,0 +1,155 @@
+"""`composer echo`, `call`, `send-goal` and `set`, against one running system."""
+
+import os
+import signal
+import subprocess
+import sys
+from functools import partial
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+pytestmark = pytest.mark.ros
+
+SYSTEM = """
+version: 1
+nodes:
+  talker:
+    state: {count: 0}
+    parameters:
+      gain: {default: 1.0, minimum: -2.0, maximum: 5.0}
+      steps: {default: [1.0, 2.0]}
+    publishers: {scan: sensor_msgs/msg/LaserScan}
+    timers: {scan: {rate: 20, behaviour: 'parts:scan', publish: scan}}
+    services: {add: {type: test_msgs/srv/BasicTypes, behaviour: 'parts:add'}}
+    actions: {count: {type: test_msgs/action/Fibonacci, behaviour: 'parts:count'}}
+"""
+CODE = """
+def scan(node):
+    return {'header': {'frame_id': 'base: no'}, 'ranges': [0.5, float('inf')] * 100}
+
+def add(node, request):
+    return {'int64_value': request.int64_value + round(node.parameters.gain)}
+
+def count(node, goal):
+    if goal.order < 0:
+        raise ValueError('negative')
+    for number in range(goal.order):
+        node.sleep(0.02)
+        yield {'sequence': list(range(number))}
+    return {'sequence': [goal.order]}
+"""
+
+
+def begin(domain_id, *words):
+    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
+    # A tilde stands for a space.
+    words = [each.replace('~', ' ') for each in words]
+    return subprocess.Popen([sys.executable, '-m', 'composer', *words], env=environment, **pipes)
+
+
+@pytest.fixture(scope='module')
+def run(shared_compose):
+    """Return a function that runs a command beside the system: its exit code and outputs."""
+    child = shared_compose(SYSTEM, CODE)
+    child.wait_until_ready()
+
+    def run(*words):
+        with run.begin(*words) as child:
+            out, err = child.communicate(timeout=50)
+        return child.returncode, out, err
+
+    run.begin = partial(begin, shared_compose.domain_id)
+
+    yield run
+    assert child.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ('words', 'printed'),
+    [
+        ('echo scan header.frame_id --once', '"base: no"\n'),
+        ('echo /scan ranges[1] --once', '.inf\n'),
+        ('echo scan header.stamp --once', 'sec: 0\nnanosec: 0\n'),
+        ('send-goal count 0', 'sequence: [0]\n---\n'),
+        (
+            'send-goal /count {order:~2}',
+            'sequence: []\n---\nsequence: [0]\n---\nsequence: [2]\n---\n',
+        ),
+        ('set /talker steps [3,~4.5]', ''),
+    ],
+)
+def test_what_is_there_is_printed(run, words, printed):
+    assert run(*words.split()) == (0, printed, '')
+
+
+def test_messages_are_yaml_and_long_arrays_are_cut(run):
+    code, out, _ = run('echo', 'scan', '--once')
+    assert code == 0
+    assert out.startswith('header:\n  stamp:\n    sec: 0\n')
+    assert out.endswith('intensities: []\n---\n')
+    assert '.inf, 0.5, .inf, "… 72 more"]\n' in out
+
+
+def test_a_parameter_that_is_set_governs_the_next_call(run):
+    for value, answer in (('-2', 39), ('3', 44)):
+        assert run('set', 'talker', 'gain', value) == (0, '', '')
+        code, out, err = run('call', 'add', '{int64_value: 41}')
+        assert (code, err) == (0, '')
+        assert f'\nint64_value: {answer}\n' in out
+
+
+@pytest.mark.parametrize(
+    ('words', 'code', 'told'),
+    [
+        ('echo scna', 1, ["no topic '/scna'", "did you mean '/scan'?"]),
+        ('echo scan rangs', 1, ["no field 'rangs'", "did you mean 'ranges'?"]),
+        ('echo scan ranges[900] --once', 1, ["a message has no 'ranges[900]'"]),
+        ('echo scan ranges.', 2, ["'ranges.' is no field"]),
+        ('call ad', 1, ["no service '/ad'", "did you mean '/add'?"]),
+        ('call add {int64_vlue:~1}', 1, ["no field 'int64_vlue'", "'int64_value'?"]),
+        ('call add {int64_value:~a}', 1, ["int64_value: expected int64, got str 'a'"]),
+        ('call add {int64_value:', 2, ['is no YAML']),
+        ('send-goal cont 1', 1, ["no action '/cont'", "did you mean '/count'?"]),
+        ('send-goal count -- -1', 1, ['the goal was aborted']),
+        ('set tlker gain 1', 1, ["no node 'tlker'", "did you mean '/talker'?"]),
+        ('set talker gian 1', 1, ["no parameter 'gian'", "did you mean 'gain'?"]),
+        ('set talker gain 9', 1, ["'/talker' refuses gain = 9", 'out of range']),
+        ('set talker gain {a:~1}', 1, ['no value of a parameter']),
+    ],
+)
+def test_what_is_wrong_is_told_with_a_way_out(run, words, code, told):
+    words = words.split()
+    # What is not there is not waited for; what is there may be found late.
+    limit = ['--timeout', '2' if 'no ' in told[0] and '/' in told[0] else '40']
+    found, _, err = run(*words[:1], *limit, *words[1:])
+    assert (found, 'Traceback' in err) == (code, False)
+    for each in told:
+        assert each in err
+
+
+@pytest.mark.parametrize(
+    ('words', 'line', 'code'),
+    [
+        (['echo', 'scan', '--hz'], ' Hz: ', 0),
+        (['echo', 'scan'], 'ranges: ', 0),
+        (['send-goal', 'count', '100000'], 'sequence: ', 1),
+    ],
+)
+def test_an_interrupt_ends_it(run, words, line, code):
+    with run.begin(*words) as child:
+        assert any(line in each for each in child.stdout)
+        child.send_signal(signal.SIGINT)
+        _, err = child.communicate(timeout=40)
+    assert child.returncode == code
+    assert err == ('canceling the goal\nthe goal was canceled\n' if code else '')
+
+
+def test_the_shell_completes_names(run, monkeypatch):
+    for words, name in (('echo sc', '/scan'), ('set', '/talker'), ('send-goal /c', '/count')):
+        monkeypatch.setenv('COMP_WORDS', f'composer {words}')
+        monkeypatch.setenv('COMP_CWORD', str(words.count(' ') + 1 + (words == 'set')))
+        monkeypatch.setenv('_COMPOSER_COMPLETE', 'bash_complete')
+        assert f'plain,{name}\n' in run()[1]
