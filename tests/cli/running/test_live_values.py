@@ -10,6 +10,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from tests.running import wait_for
+
 pytestmark = pytest.mark.ros
 
 SYSTEM = """
@@ -152,4 +154,4 @@ def test_the_shell_completes_names(run, monkeypatch):
         monkeypatch.setenv('COMP_WORDS', f'composer {words}')
         monkeypatch.setenv('COMP_CWORD', str(words.count(' ') + 1 + (words == 'set')))
         monkeypatch.setenv('_COMPOSER_COMPLETE', 'bash_complete')
-        assert f'plain,{name}\n' in run()[1]
+        wait_for(lambda name=name: f'plain,{name}\n' in run()[1], f'{name} to be offered')
