@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # What only expressions use.
 _VALUES: dict[DataPath, str] = {('args',): 'argument', ('vars',): 'variable'}
+# Below the path of a node that may be one of an include.
+REACHING = 'reaching'
 # What is in these is the user's own.
 _FREE = ('message', 'state', 'with')
 
@@ -42,12 +44,14 @@ def _merge(below: Document, above: Document, users: Sequence[Document]) -> Docum
     diagnostics = [*below.diagnostics, *above.diagnostics]
     if below.data is None or above.data is None:
         return Document(None, below.positions, diagnostics)
-    merging = _Merging(below.positions.copy(), above.positions, users)
-    data = merging.merge(below.data, above.data, ())
+    merging = Merging(below.positions.copy(), above.positions, users)
+    # Each node of a layer is looked at, also if there are none below.
+    own: dict[str, Any] = {'nodes': {}} if isinstance(above.data.get('nodes'), dict) else {}
+    data = merging.merge(own | below.data, above.data, ())
     return Document(data, merging.positions, [*diagnostics, *merging.findings])
 
 
-class _Merging:
+class Merging:
     """Merges a layer into what is below it.
 
     Args:
@@ -63,14 +67,21 @@ class _Merging:
         self.findings: list[Diagnostic] = []
         self._new_positions = new_positions
         self._users = users
+        self._has_includes = any(path[0] == 'include' for path in positions.keys)
 
     def merge(
         self, below: dict[str, Any], above: dict[str, Any], path: DataPath
     ) -> dict[str, Any]:
+        """Return a mapping at a path as the layer changes it."""
         merged = dict(below)
         for key, value in above.items():
             at = (*path, key)
-            if value is None and not is_null_a_value(at):
+            if self._may_reach(path, key, value, below):
+                # Nulls remove what the node has, wherever it is declared.
+                merged[key] = _overlaid(merged.get(key, {}), value)
+                self.positions.graft(at, self._new_positions.branch(at))
+                self.positions.values[*at, REACHING] = self._new_positions.key(at)
+            elif value is None and not is_null_a_value(at):
                 if key not in merged:
                     self._report(at, f"null removes '{key}', which does not exist", below)
                 merged.pop(key, None)
@@ -93,6 +104,13 @@ class _Merging:
                 merged[key] = self._without_removals(value, at)
                 self.positions.replace(at, self._new_positions)
         return merged
+
+    def _may_reach(self, path: DataPath, key: str, value: Any, below: dict[str, Any]) -> bool:
+        """Return whether an entry may be about a node of an include, by its full name."""
+        if path != ('nodes',) or not isinstance(value, dict) or not key.startswith('/'):
+            return False
+        is_new = key not in below and self._has_includes
+        return is_new or (*path, key, REACHING) in self.positions.values
 
     def _without_removals(self, value: Any, path: DataPath) -> Any:
         """Return a new value without nulls, which have nothing to remove."""
@@ -184,6 +202,22 @@ def _only_changes_a_node(path: DataPath, value: Any) -> bool:
     """Return whether a value only changes a node, and gives it nothing to do."""
     is_node = len(path) == _NODE and path[0] == 'nodes'
     return is_node and isinstance(value, dict) and 0 < len(value) == len(value.keys() & _CHANGES)
+
+
+def is_change_of_node(value: Any) -> bool:
+    """Return whether what a layer says of a node can only change one."""
+    path = ('nodes', 'node')
+    return _only_changes_a_node(path, value) or lacks_keys({'nodes': {'node': value}})
+
+
+def _overlaid(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Return what two layers say of a node that is in neither of them."""
+    both = {
+        key: _overlaid(below[key], value)
+        for key, value in above.items()
+        if isinstance(value, dict) and isinstance(below.get(key), dict)
+    }
+    return below | above | both
 
 
 def is_null_a_value(path: DataPath) -> bool:

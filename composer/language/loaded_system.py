@@ -11,7 +11,7 @@ from composer.language.values.start_values import StartValues
 from composer.yaml_text.document import Document
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from composer.diagnostics import Related, SourceFile, Span
     from composer.language.arguments import ArgumentSpec
@@ -20,6 +20,28 @@ if TYPE_CHECKING:
 
 # The sections whose entries become part of a file that includes theirs.
 PARTS = ('nodes', 'processes', 'qos', 'interfaces', 'workers', 'hosts')
+
+
+@dataclass(slots=True)
+class Reaching:
+    """What layers say of nodes by their full names; all files of a system share it.
+
+    Attributes:
+        own: The names of those that no file has: nodes of their own.
+        full_names: Those of all nodes, once they are known.
+        changes: What is said of the others.
+        met: The names that a file has.
+    """
+
+    own: Collection[str] = ()
+    full_names: Collection[str] = ()
+    changes: dict[str, tuple[dict[str, Any], Branch]] = field(default_factory=dict)
+    met: set[str] = field(default_factory=set)
+
+    @property
+    def missed(self) -> set[str]:
+        """The names that no file has."""
+        return self.changes.keys() - self.met
 
 
 @dataclass(slots=True, kw_only=True)
@@ -44,6 +66,7 @@ class LoadedSystem(Document):
         filled: The data with these values, or samples of them, in place.
         namespace: That of the includes around it.
         ros_arguments: The arguments after `--ros-args` of the command line.
+        reaching: What layers say of nodes by their full names.
         spec: The system without the parts that were wrong; `None` if nothing could be read.
         unused: As `spec`, of the nodes and processes whose `when`, or that of their include, does
             not hold; and of nodes with entities whose `when` does not hold, with all of these.
@@ -62,6 +85,7 @@ class LoadedSystem(Document):
     filled: dict[str, Any] = field(default_factory=dict)
     namespace: str = ''
     ros_arguments: Sequence[str] = ()
+    reaching: Reaching = field(default_factory=Reaching)
     spec: SystemSpec | None = None
     unused: SystemSpec | None = None
     _branches: dict[str, dict[Key, Branch]] = field(default_factory=dict)

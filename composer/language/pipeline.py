@@ -18,8 +18,9 @@ from composer.language.arguments import sample_values, values_from_words
 from composer.language.defaults import apply_defaults
 from composer.language.evaluate import evaluate_expressions, give_arguments
 from composer.language.includes.includer import Includer
+from composer.language.includes.reaching import apply_changes, take_changes
 from composer.language.layers import merge_documents
-from composer.language.loaded_system import LoadedSystem
+from composer.language.loaded_system import LoadedSystem, Reaching
 from composer.language.nodl.named_documents import read_node_interfaces
 from composer.language.parsing.container_parser import fold_containers
 from composer.language.parsing.system_parser import parse_specs
@@ -137,8 +138,10 @@ def _load(
     before: LoadedSystem | None = None,
     read_value: ReadValue | None = None,
     ros_arguments: Sequence[str] = (),
+    reaching: Reaching | None = None,
 ) -> LoadedSystem:
     system = LoadedSystem.of(document, path)
+    system.reaching = reaching or Reaching()
     system.ros_arguments = ros_arguments
     system.start.read = read_value
     if 'version' not in system.entries and not confidential.may_show_lines(str(path)):
@@ -151,6 +154,11 @@ def _load(
         Includer(system, _load_file).include_all()
     if system.data is not None:
         parse_specs(system, before)
+    if reaching is None and system.reaching.missed:
+        # These are nodes of their own, or a finding.
+        nodes = system.spec.nodes.values() if system.spec else ()
+        again = Reaching(system.reaching.missed, [node.full_name for node in nodes])
+        return _load(document, path, give_values, before, read_value, ros_arguments, again)
     return system
 
 
@@ -164,6 +172,8 @@ def _load_file(system: LoadedSystem, give_values: GiveValues) -> None:
     evaluate_expressions(system)
     if system.data is None:
         return
+    take_changes(system)
+    apply_changes(system)
     check_structure(system)
     fold_containers(system)
     resolve_paths(system)

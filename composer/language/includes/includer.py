@@ -17,7 +17,7 @@ from composer.input_limits import MAX_ENTRIES, MAX_FINDINGS, MAX_INCLUDE_DEPTH, 
 from composer.language.includes.include_arguments import values_from_include
 from composer.language.includes.include_entry import IncludeEntry, shown_path
 from composer.language.includes.merging import IncludeMerger, Inclusion
-from composer.language.loaded_system import LoadedSystem
+from composer.language.loaded_system import LoadedSystem, Reaching
 from composer.language.namespaces import join_namespaces
 from composer.language.values.start_values import StartValues
 from composer.yaml_text.reader import read_document
@@ -152,6 +152,8 @@ class Includer:
         part = LoadedSystem.of(self._document(path, real), path)
         part.namespace = join_namespaces(entry.system.namespace, namespace)
         part.ros_arguments = entry.system.ros_arguments
+        # What is left out takes no change from what is used.
+        part.reaching = Reaching() if is_left_out else entry.system.reaching
         part.start = StartValues() if is_left_out else entry.system.start
         if 'version' not in part.entries and not may_show_lines(real):
             # What is wrong with it would tell what is in it.
