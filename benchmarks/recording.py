@@ -1,4 +1,4 @@
-"""What it costs to record a message of 1 kB: a system that publishes them, with and without."""
+"""What it costs to record or trace messages of 1 kB, beside a system that only publishes them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def measure(side: str, _size: int, seconds: float) -> dict[str, float]:
     """Return what a message takes, at 5,000 a second.
 
     Args:
-        side: `recorded` or `alone`.
+        side: `recorded`, `traced` or `alone`.
 
     Returns:
         Processor time: `cpu_us` of the whole process, and `publish_us` of the behaviour alone.
@@ -41,7 +41,10 @@ def measure(side: str, _size: int, seconds: float) -> dict[str, float]:
         'hearer': {'subscriptions': {'words': hearer}},
     }
     with tempfile.TemporaryDirectory() as folder:
-        options = ['--record', str(Path(folder) / 'words.mcap')] if side == 'recorded' else []
+        options = {
+            'recorded': ['--record', str(Path(folder) / 'words.mcap')],
+            'traced': ['--trace', str(Path(folder) / 'words.json')],
+        }.get(side, [])
         with composed(render_system(nodes), *options) as program:
             program.wait_for_line(READY)
             return printed_figures(program, seconds + _SPARE_SEC)

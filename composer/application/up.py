@@ -6,14 +6,16 @@ import io
 import os
 import sys
 from contextlib import suppress
+from functools import partial
 from time import time_ns
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import click
 
 from composer.application.output import show_findings
 from composer.application.recording_options import RecordingOptions
 from composer.application.system_reader import SystemReader, import_reading
+from composer.application.timelines import write_timeline
 from composer.diagnostics import has_errors
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.declared_packages import import_declared
@@ -58,6 +60,7 @@ def up(  # noqa: PLR0913 - one for each option
     is_asked: bool = True,
     recording: RecordingOptions | None = None,
     hold: Path | None = None,
+    trace: IO[str] | None = None,
     ends_process: bool = False,
 ) -> int:
     """Run a system until it ends; return the exit code.
@@ -73,6 +76,7 @@ def up(  # noqa: PLR0913 - one for each option
         is_asked: Whether the system serves what `composer reload` and the like ask.
         recording: What is recorded of it; `None` for nothing.
         hold: While this file is there, no behaviour starts; `None` for no such file.
+        trace: The file for a timeline of the whole run; `None` for none.
         ends_process: Whether the process exits afterwards.
 
     Raises:
@@ -122,6 +126,7 @@ def up(  # noqa: PLR0913 - one for each option
                 is_asked=is_asked,
                 recording=recording or RecordingOptions(),
                 hold=hold,
+                trace=trace,
                 ends_process=ends_process,
             )
 
@@ -175,6 +180,7 @@ def _run(  # noqa: PLR0913 - as above
     is_asked: bool,
     recording: RecordingOptions,
     hold: Path | None,
+    trace: IO[str] | None,
     ends_process: bool,
 ) -> int:
     from composer.interfaces.search_paths import extend_variables
@@ -205,5 +211,6 @@ def _run(  # noqa: PLR0913 - as above
                 recorder=recorder,
                 workers=workers,
                 hold=hold,
+                write_trace=None if trace is None else partial(write_timeline, trace),
                 ends_process=ends_process,
             )

@@ -60,7 +60,8 @@ class SystemRecorder:
         """
         own = _OwnPublishers(topics)
         self._topics = topics
-        topics.tap(partial(self._find_tap, own))
+        self._find = partial(self._find_tap, own)
+        topics.tap(self._find)
         self._node = create_graph_node(context, _NODE_NAME)
         self._graph = GraphRecorder(self._node, self._recorder, self._patterns, self._report, own)
         self._graph.start()
@@ -71,7 +72,7 @@ class SystemRecorder:
             return
         self._has_ended = True
         if self._topics is not None:
-            self._topics.tap(None)
+            self._topics.untap(self._find)
         if self._graph is not None:
             self._graph.stop()
         if self._node is not None:

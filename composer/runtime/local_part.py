@@ -38,10 +38,11 @@ from composer.runtime.rewiring.rewire import Rewiring
 from composer.runtime.stop import limit_stop, stop_nodes
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import SystemExecutor
+from composer.runtime.tracing.tracer import tracer
 from composer.runtime.wait_for import find_hidden
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rclpy.context import Context
     from rclpy.node import Node
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from composer.runtime.messages.local_delivery import LocalTopics
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.tracing.tracer import TracePart
 
 _EXECUTOR_STOP_SEC = 1.0
 # How long a worker that is started again waits for the clients of others, of which some may go.
@@ -99,6 +101,7 @@ class LocalPart:
     """
 
     label = 'the system'
+    write_trace: Callable[[dict[str, TracePart]], object] | None = None
     workers: AskedWorkers
 
     def __init__(  # noqa: PLR0913 - one for each part
@@ -388,6 +391,21 @@ class LocalPart:
             with self._restarter.lock:
                 failure = self._programs.components.restart(full_name)
         return Outcome(not failure, failure or f"{noun} '{full_name}' was restarted")
+
+    def begin_trace(self) -> None:
+        """Note what happens, from now on; what was noted before is forgotten."""
+        tracer.turn_on()
+        self._handle.topics.follow_taps()
+
+    def end_traces(self) -> dict[str, TracePart]:
+        """Return what each process has noted, by the name of the worker."""
+        return {'': self.end_trace()}
+
+    def end_trace(self) -> TracePart:
+        """Return what was noted, and note no more."""
+        part = tracer.take((node.full_name, node.running) for node in list(self._nodes.values()))
+        self._handle.topics.follow_taps()
+        return part
 
     @property
     def stop_requested(self) -> bool:

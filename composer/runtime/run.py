@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from composer.runtime.control.control_services import Commands
     from composer.runtime.local_part import SystemRecorder
     from composer.runtime.rewiring.reading import Reading
+    from composer.runtime.tracing.tracer import TracePart
     from composer.runtime.workers.workers import Workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -54,6 +55,7 @@ def run_system(  # noqa: PLR0913 - one for each part
     recorder: SystemRecorder | None = None,
     workers: Workers | None = None,
     hold: Path | None = None,
+    write_trace: Callable[[dict[str, TracePart]], object] | None = None,
     ends_process: bool = False,
 ) -> int:
     """Start a system, wait until a stop is requested, and stop it.
@@ -73,6 +75,7 @@ def run_system(  # noqa: PLR0913 - one for each part
         workers: Run the nodes that are in workers, and have imported their behaviours; `None` if
             all run in this process.
         hold: While this file is there, no behaviour starts; `None` for no such file.
+        write_trace: See `System`.
         ends_process: Whether the process exits afterwards: that is how a large system ends fast,
             and how the processes that behaviours have started end with it.
 
@@ -100,7 +103,7 @@ def run_system(  # noqa: PLR0913 - one for each part
             recorder=recorder,
             workers=workers,
         )
-        system.hold = hold
+        system.hold, system.write_trace = hold, write_trace
         guardian.wait_until_begun()
         # A program that runs a system in itself tells its own parent.
         notify_socket = take_notify_socket() if ends_process else None

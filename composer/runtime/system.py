@@ -30,7 +30,11 @@ if TYPE_CHECKING:
     from composer.runtime.local_part import SystemRecorder
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.stop_request import StopRequest
+    from composer.runtime.tracing.tracer import TracePart
     from composer.runtime.workers.workers import Workers
+
+# How long a worker may take to hand its trace over.
+_TRACE_SEC = 10.0
 
 
 class System(LocalPart):
@@ -44,6 +48,8 @@ class System(LocalPart):
 
     Attributes:
         hold: While this file is there, no behaviour starts; `None` for no such file.
+        write_trace: Takes what all processes have noted from the start to the stop; `None` if
+            nobody wants it.
     """
 
     def __init__(  # noqa: PLR0913 - one for each part
@@ -87,6 +93,8 @@ class System(LocalPart):
             StartError: Something could not start; all the rest has been stopped again.
         """
         together = self.workers.together
+        if self.write_trace is not None:
+            self.begin_trace()
         try:
             with together('create'):
                 self.create()
@@ -185,8 +193,19 @@ class System(LocalPart):
             return worker.restart_node(full_name)
         return super().restart_node(full_name)
 
+    def begin_trace(self) -> None:
+        """See `LocalPart`."""
+        super().begin_trace()
+        self.workers.tell_all('begin_trace')
+
+    def end_traces(self) -> dict[str, TracePart]:
+        """See `LocalPart`."""
+        return {**super().end_traces(), **self.workers.ask('end_trace', timeout_sec=_TRACE_SEC)}
+
     def _stop_nodes(self) -> bool:
         """Stop all nodes, those in workers, too; return whether those of this process ended."""
+        if self.write_trace is not None:
+            self.write_trace(self.end_traces())
         self.workers.begin_stop()
         ended = super()._stop_nodes()
         code, ended_elsewhere = self.workers.stop()

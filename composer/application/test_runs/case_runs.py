@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.reports.report import Attempt
+from composer.runtime.tracing.tracer import TracePart
 from composer.scenarios.running.case_results import CaseRequest, CaseResult
 from composer.scenarios.running.orders import compare_orders
 
@@ -60,6 +62,18 @@ class CaseRuns:
                     part = self._trace(index, attempt)
                     trace.write(part.read_bytes() if part.exists() else b'')
 
+    def read_timelines(self) -> dict[str, TracePart]:
+        """Return what callbacks did in each case, in the default order."""
+        files = {each.title: self._timeline(index) for index, each in enumerate(self.reports)}
+        return {
+            title: TracePart(*json.loads(file.read_text()))
+            for title, file in files.items()
+            if file.exists()
+        }
+
+    def _timeline(self, index: int) -> Path:
+        return self._folder / f'{index}.json'
+
     def _requests(self) -> dict[tuple[int, int], CaseRequest]:
         return {
             (index, attempt): self._request(index, attempt)
@@ -78,6 +92,7 @@ class CaseRuns:
             shuffle=attempt,
             real_time_limit_sec=options.limit_sec,
             trace=str(self._trace(index, attempt)) if wants_trace else '',
+            timeline=str(self._timeline(index)) if options.timeline and not attempt else '',
             captures=not options.shows_output,
         )
 

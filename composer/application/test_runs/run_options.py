@@ -22,6 +22,7 @@ class RunOptions:
         shuffles: How many other orders to try.
         limit_sec: In place of the cases' limits of real time.
         trace: The file for the events of all cases.
+        timeline: The file for a timeline of all cases.
         junit: The file for the report in the format of JUnit.
         format: `text`, `json` or `github`.
         shows_output: Whether output of behaviours is shown at once.
@@ -34,6 +35,7 @@ class RunOptions:
     shuffles: int = 0
     limit_sec: float | None = None
     trace: Path | None = None
+    timeline: Path | None = None
     junit: Path | None = None
     format: str = 'text'
     shows_output: bool = False

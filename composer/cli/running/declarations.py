@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
 from composer.cli.common.argument_types import NUMBERS_ARE_VALUES, takes_format
 from composer.cli.running.top_table import DEFAULT_SORT, SORT_NAMES, View
-from composer.errors import UsageError
+from composer.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 _LONGEST_SEC = 60.0
 _ANSWER_SEC = 5.0
+_TRACE_SEC = 10.0
 
 _timeout = click.option(
     '--timeout',
@@ -95,6 +96,39 @@ def top_command(
     from composer.cli.running.top import top
 
     return top(name, view, once=once, format_name=format_name)
+
+
+@click.command('trace')
+@_takes_name
+@click.option(
+    '--seconds',
+    'trace_sec',
+    type=click.FloatRange(min=0, min_open=True),
+    default=_TRACE_SEC,
+    show_default=True,
+    metavar='SEC',
+    help='How long to look at it.',
+)
+@click.option(
+    '-o',
+    '--output',
+    type=click.File('w', 'utf-8', lazy=False),
+    default='trace.json',
+    show_default=True,
+    metavar='FILE',
+    help='The file to write.',
+)
+def trace_command(name: str | None, trace_sec: float, output: IO[str]) -> int:
+    """Write when callbacks of SYSTEM run.
+
+    The file is a timeline for ui.perfetto.dev or chrome://tracing, of callbacks, waits, calls and
+    goals, with arrows from messages to the callbacks that get them, the lengths of queues, dropped
+    messages and late timers. A summary is printed.
+    """
+    from composer.application.timelines import trace
+
+    trace(name, trace_sec, output)
+    return ExitCode.DONE
 
 
 @click.command('reload')
@@ -284,6 +318,7 @@ COMMANDS = (
     set_command,
     ps_command,
     top_command,
+    trace_command,
     logs_command,
     reload_command,
     restart_command,

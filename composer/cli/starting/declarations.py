@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import IO
 
 import click
 
@@ -57,6 +58,12 @@ from composer.terminal import escape
 )
 @takes_topics
 @click.option(
+    '--trace',
+    type=click.File('w', 'utf-8', lazy=False),
+    metavar='FILE',
+    help='Write a timeline of all callbacks to this file, which Perfetto opens.',
+)
+@click.option(
     '--hold',
     type=click.Path(path_type=Path, dir_okay=False),
     metavar='FILE',
@@ -78,6 +85,7 @@ def up_command(  # noqa: PLR0913 - one for each option
     is_asked: bool,
     record: Path | None,
     topics: tuple[str, ...],
+    trace: IO[str] | None,
     hold: Path | None,
     wants_help: bool,
 ) -> int:
@@ -105,6 +113,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         options += ['--watch'] * watches + ['--no-control'] * (not is_asked)
         options += [f'--record={record}'] * (record is not None)
         options += [f'--topics={each}' for each in topics]
+        options += [] if trace is None else [f'--trace={trace.name}']
         options += [f'--hold={hold}'] * (hold is not None)
         given = [*options, *words, '--ros-args', *context.obj, '--']
         return start_detached(paths[0], given, host)
@@ -119,6 +128,7 @@ def up_command(  # noqa: PLR0913 - one for each option
         is_asked=is_asked,
         recording=RecordingOptions(record, topics),
         hold=hold,
+        trace=trace,
         ends_process=True,
     )
 

@@ -49,6 +49,11 @@ _file = click.Path(path_type=Path, dir_okay=False)
     help='End a case after so much real time, instead of what it says.',
 )
 @click.option('--trace', type=_file, help='Write each event to this file, a line each.')
+@click.option(
+    '--timeline',
+    type=_file,
+    help='Write when callbacks ran to this file, which Perfetto opens.',
+)
 @click.option('--junit', type=_file, help='Write a report in the format of JUnit to this file.')
 @takes_format(FORMATS)
 @click.option(
@@ -66,6 +71,7 @@ def test_command(  # noqa: PLR0913 - one for each option
     shuffles: int,
     limit_sec: float | None,
     trace: Path | None,
+    timeline: Path | None,
     junit: Path | None,
     format_name: str,
     shows_output: bool,
@@ -91,6 +97,7 @@ def test_command(  # noqa: PLR0913 - one for each option
         shuffles=shuffles,
         limit_sec=limit_sec,
         trace=trace,
+        timeline=timeline,
         junit=junit,
         format=format_name,
         shows_output=shows_output,

@@ -20,6 +20,7 @@ from composer.reports import render_report
 from composer.reports.report import Report
 from composer.reports.text import render_case, render_end
 from composer.runtime.environment import check_ros, find_colour
+from composer.runtime.tracing.timeline import Timeline
 from composer.scenarios.running.case_client import CaseClient
 from composer.terminal import escape
 
@@ -75,6 +76,9 @@ def _run(
             break
     if options.trace:
         runs.write_trace(options.trace)
+    if options.timeline:
+        text = Timeline(runs.read_timelines()).render()
+        write_file(options.timeline, text, 'the timeline')
     report = _report(runs.reports, plan, options, started, end)
     if not plan.cases:
         _explain_nothing(plan, words)

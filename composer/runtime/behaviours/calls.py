@@ -14,6 +14,7 @@ from composer.executor.after_fork import end_child
 from composer.python_source.function_kinds import FunctionKind
 from composer.runtime import forked_children
 from composer.runtime.behaviours.callables import kind_of
+from composer.runtime.tracing.tracer import COROUTINE, tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -109,6 +110,7 @@ class BehaviourCall:
 
         def call_behaviour(*arguments: Any) -> Any:
             token = next(tokens)
+            traced = tracer.begin(arguments) if tracer.is_on else None
             begun_ns = now_ns()
             entries[token] = (owner, begun_ns, get_thread(), None, progress)
             try:
@@ -128,6 +130,8 @@ class BehaviourCall:
             finally:
                 if add_time is not None:
                     add_time(now_ns() - begun_ns)
+                if traced is not None:
+                    tracer.end('callback', running.node, owner, traced)
                 running.last = owner, begun_ns
                 # As `running.end` does.
                 del entries[token]
@@ -140,6 +144,7 @@ class BehaviourCall:
         running, add_time = self._running, self._add_time
 
         async def await_behaviour(*arguments: Any) -> Any:
+            traced = tracer.begin(arguments) if tracer.is_on else None
             begun_ns = monotonic_ns()
             token = None
             try:
@@ -165,6 +170,8 @@ class BehaviourCall:
             finally:
                 if add_time is not None:
                     add_time(monotonic_ns() - begun_ns)
+                if traced is not None:
+                    tracer.end('callback', running.node, self._owner, traced, COROUTINE)
                 running.last = self._owner, begun_ns
                 if token is not None:
                     running.end(token)

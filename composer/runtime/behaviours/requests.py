@@ -11,6 +11,7 @@ from rclpy.exceptions import InvalidHandle
 
 from composer.errors import CallError, ComposerError, ServiceFailedError
 from composer.records import record
+from composer.runtime.tracing.tracer import COROUTINE, tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -130,6 +131,7 @@ class Requests:
         begun, losses = monotonic(), self.losses
         if not self.waits.until_true(self._has_server, timeout_sec, self.notice):
             raise self.unavailable(timeout_sec or 0.0)
+        traced = tracer.begin() if tracer.is_on else None
         future = self._begin(send, losses)
         try:
             if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
@@ -138,6 +140,8 @@ class Requests:
             self.waiting.discard(future)
             if not future.done():
                 self.forget(future)
+            if traced is not None:
+                tracer.end('call', self.waits.node, self.notice.what, traced)
         return future.result()
 
     async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
@@ -149,6 +153,7 @@ class Requests:
             has_server, timeout_sec, self.notice
         ):
             raise self.unavailable(timeout_sec or 0.0)
+        traced = tracer.begin() if tracer.is_on else None
         future = self._begin(send, losses)
         try:
             if not await self.waits.until_answered_async(future, _remaining(timeout_sec, begun)):
@@ -157,6 +162,8 @@ class Requests:
             self.waiting.discard(future)
             if not future.done():
                 self.forget(future)
+            if traced is not None:
+                tracer.end('call', self.waits.node, self.notice.what, traced, COROUTINE)
         return future.result()
 
     def _has_server(self) -> bool:

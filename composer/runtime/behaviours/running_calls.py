@@ -107,6 +107,7 @@ class RunningCalls:
     Attributes:
         entries: The calls, by tokens; `None` for work that has no stack of its own.
         tokens: The token of the next entry.
+        node: The full name of the node.
         last: Whose call ended last, and when it had begun, by `time.monotonic_ns`.
         has_listeners: Whether somebody must be told when an entry is removed.
     """
@@ -118,12 +119,14 @@ class RunningCalls:
         'entries',
         'has_listeners',
         'last',
+        'node',
         'tokens',
     )
 
     def __init__(self) -> None:
         self.entries: dict[int, _CallEntry | None] = {}
         self.tokens = itertools.count()
+        self.node = ''
         self.last: tuple[Owner, int] | None = None
         self.has_listeners = False
         self._waiters = 0

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.task import Future
 
 from composer.errors import SystemStoppingError
+from composer.runtime.tracing.tracer import COROUTINE, tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,11 +46,14 @@ class WaitNotice:
     Args:
         log: Takes the text, as a logger does.
         what: What is waited for, as in `service '/ask'`.
+
+    Attributes:
+        what: The same.
     """
 
     def __init__(self, log: Callable[[str], Any], what: str) -> None:
         self._log = log
-        self._what = what
+        self.what = what
         self._last = float('-inf')
 
     def log_if_due(self, begun: float, now: float | None = None) -> None:
@@ -62,7 +66,7 @@ class WaitNotice:
         now = monotonic() if now is None else now
         if now - begun >= _FIRST_NOTICE_SEC and now - self._last >= _NOTICE_PERIOD_SEC:
             self._last = now
-            self._log(f'Waiting for {self._what}…')
+            self._log(f'Waiting for {self.what}…')
 
 
 class Waits:
@@ -70,10 +74,14 @@ class Waits:
 
     Args:
         executor: Runs the behaviours.
+
+    Attributes:
+        node: The full name of the node.
     """
 
     def __init__(self, executor: ComposerExecutor, stop: StopRequest) -> None:
         self.stop = stop
+        self.node = ''
         self._executor = executor
         self._may_wait_at_stop = False
 
@@ -183,7 +191,7 @@ class Waits:
         if condition():
             return True
         begun = monotonic()
-        with self.make_room():
+        with self.make_room(), tracer.waiting(self.node, notice.what):
             while not condition():
                 if self._is_refused():
                     raise stopping_error()
@@ -200,14 +208,15 @@ class Waits:
         if condition():
             return True
         begun = monotonic()
-        while not condition():
-            if self._is_refused():
-                raise stopping_error()
-            if _is_over(begun, timeout_sec):
-                return False
-            notice.log_if_due(begun)
-            pause: Future = Future()
-            await self._with_timeout(_POLL_SEC, partial(pause.set_result, None), pause)
+        with tracer.waiting(self.node, notice.what, COROUTINE):
+            while not condition():
+                if self._is_refused():
+                    raise stopping_error()
+                if _is_over(begun, timeout_sec):
+                    return False
+                notice.log_if_due(begun)
+                pause: Future = Future()
+                await self._with_timeout(_POLL_SEC, partial(pause.set_result, None), pause)
         return True
 
     @contextmanager

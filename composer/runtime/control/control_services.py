@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import zlib
+from base64 import b64encode
 from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
@@ -22,9 +25,12 @@ if TYPE_CHECKING:
 
     from composer.planning.snapshot import Snapshot
     from composer.runtime.health.deliveries import Deliveries
+    from composer.runtime.tracing.tracer import TracePart
 
 
 _STARTING = 'the system is still starting'
+# Of a trace, in one answer: more than a datagram takes many of them.
+_PART_SIZE = 400_000
 
 
 class AskedWorkers(Protocol):
@@ -49,6 +55,10 @@ class ControlledSystem(Protocol):
         """Its state."""
 
     @property
+    def write_trace(self) -> object:
+        """What takes the trace of the whole run; `None` if nothing does."""
+
+    @property
     def workers(self) -> AskedWorkers:
         """Its workers."""
 
@@ -66,6 +76,12 @@ class ControlledSystem(Protocol):
 
     def restart_node(self, full_name: str) -> Outcome:
         """Build a node anew."""
+
+    def begin_trace(self) -> None:
+        """Note what happens from now on."""
+
+    def end_traces(self) -> dict[str, TracePart]:
+        """Return what each process has noted."""
 
     def request_stop(self, code: int = ExitCode.DONE) -> None:
         """Let it stop."""
@@ -111,6 +127,7 @@ class ControlServices:
         from std_srvs.srv import Trigger
 
         self._system = system
+        self._trace = ''
         self.answered = float('-inf')
         # What changes no node is served beside a reload, which may wait for a goal.
         queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
@@ -118,6 +135,8 @@ class ControlServices:
             (protocol.STATUS, status, queries),
             (protocol.TOP, top, queries),
             (protocol.SNAPSHOT, lambda: snapshot_answer(system.snapshot, commands.given), queries),
+            (protocol.TRACE, self._begin_trace, changes),
+            (protocol.TRACE_READ, self._read_trace, changes),
             (protocol.DOWN, self._stop_system, queries),
             (protocol.PLAN, lambda: commands.plan(system), changes),
             (protocol.RELOAD, lambda: self._reload(commands.reload), changes),
@@ -161,6 +180,21 @@ class ControlServices:
         if name not in (*self._system.list_nodes(), *self._system.list_components(), *processes):
             return Outcome(succeeded=False, text=f"the system has no node or process '{name}'")
         return self._system.restart_node(name)
+
+    def _begin_trace(self) -> Outcome:
+        if self._system.write_trace is not None:
+            return Outcome(succeeded=False, text='the system is traced already, by up --trace')
+        self._trace = ''
+        self._system.begin_trace()
+        return Outcome(succeeded=True, text='')
+
+    def _read_trace(self) -> Outcome:
+        """End the trace, and return the next part of it; the last one ends with a dot."""
+        if not self._trace:
+            text = json.dumps(self._system.end_traces())
+            self._trace = f'{b64encode(zlib.compress(text.encode(), 1)).decode()}.'
+        part, self._trace = self._trace[:_PART_SIZE], self._trace[_PART_SIZE:]
+        return Outcome(succeeded=True, text=part)
 
     def _stop_system(self) -> Outcome:
         self._system.request_stop()

@@ -23,6 +23,8 @@ RESTART: Final = 'restart'
 DOWN: Final = 'down'
 SNAPSHOT: Final = 'snapshot'
 TOP: Final = 'top'
+TRACE: Final = 'trace'
+TRACE_READ: Final = 'trace_read'
 
 _STATUS_SERVICE = re.compile(rf'(/.*)?/{_PREFIX}[^/]+/{STATUS}')
 

@@ -23,6 +23,7 @@ from composer.runtime.entities.local_goals import GoalServer
 from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.messages.payloads import converter_for
 from composer.runtime.nodes.goals import STATUS_NAMES
+from composer.runtime.tracing.tracer import COROUTINE, tracer
 
 if TYPE_CHECKING:
     from composer.language.specs import ActionSpec
@@ -219,6 +220,7 @@ class _Execution:
     async def execute(self, goal: Any) -> Any:
         """Return the result of a goal, which has its final state then."""
         result = FAILED
+        traced = tracer.begin() if tracer.is_on else None
         try:
             if not self._end_early(goal):
                 progress = Progress()
@@ -230,6 +232,8 @@ class _Execution:
             self._tell_result(goal, result)
             return result
         finally:
+            if traced is not None:
+                tracer.end('goal', self._node_name, self._name, traced, COROUTINE)
             self._queue.finished(goal)
 
     def tell(self, kind: EventKind, message: Any) -> None:

@@ -9,6 +9,7 @@ from rclpy.timer import Timer
 from composer.executor.sources.inbox import Inbox
 from composer.records import record
 from composer.runtime.health.watched_clocks import WallClock
+from composer.runtime.tracing.tracer import tracer
 
 _LATE_SHARE = 0.1
 _MIN_LATE_NS = 1_000_000
@@ -48,7 +49,14 @@ class MissedCounts:
 
 
 class MissedNothing:
-    """Counts what an entity misses: by itself, none."""
+    """Counts what an entity misses: by itself, none.
+
+    Attributes:
+        node: The full name of the entity's node.
+        what: What a trace calls the entity.
+    """
+
+    node = what = ''
 
     def __call__(self) -> MissedCounts:
         """Return what it has missed."""
@@ -60,20 +68,23 @@ class MissedNothing:
 
 
 def count_missed(
-    executor: Any, node: Any, entity: Any, inbox: Inbox | None = None
+    executor: Any, node: Any, entity: Any, inbox: Inbox | None = None, what: str = ''
 ) -> MissedNothing:
     """Begin to count what an entity of `node` misses in `executor`; returns what tells it.
 
     Args:
         inbox: The queue of a subscription for what does not come through the middleware.
+        what: What a trace calls a timer.
     """
     counter: MissedNothing
     if isinstance(entity, Subscription):
         counter = QueueOverruns(entity.qos_profile, inbox)
+        what = entity.topic_name
     elif isinstance(entity, Timer):
         counter = MissedTicks()
     else:
         return MissedNothing()
+    counter.what = what
     executor.observe(node, entity, counter)
     return counter
 
@@ -102,6 +113,8 @@ class MissedTicks(MissedNothing):
             return
         if late_ns > _MIN_LATE_NS and late_ns > _LATE_SHARE * period_ns:
             self._late += 1
+            if tracer.is_on:
+                tracer.note('late', self.node, self.what, late_ns)
         # rcl sets the next tick to the next multiple of the period that has not passed.
         self._skipped += max(0, next_ns // period_ns - 1)
 
@@ -143,6 +156,8 @@ class QueueOverruns(MissedNothing):
             self._is_counting = False
         else:
             self._arrived += count
+            if tracer.is_on:
+                tracer.note('queue', self.node, self.what, self.queued())
 
     def begin_take(self) -> int:
         """Note that a take begins; returns how many had come until then."""
@@ -160,4 +175,7 @@ class QueueOverruns(MissedNothing):
 
     def _note_overruns(self, count: int) -> None:
         # A message may be taken right before its event comes, which makes one count too low.
-        self._overruns = max(self._overruns, count)
+        if count > self._overruns:
+            if tracer.is_on:
+                tracer.note('dropped', self.node, self.what, count - self._overruns)
+            self._overruns = count

@@ -28,6 +28,7 @@ from composer.runtime.messages.delivery_policies import (
     why_sent,
 )
 from composer.runtime.messages.ownership import ownership_of
+from composer.runtime.tracing.tracer import TracedInbox, tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -75,7 +76,8 @@ class LocalPublisher:
         self._has_sent = False
         self._lock = threading.RLock()  # A finalizer may publish.
         # In one variable: another thread may hand over meanwhile.
-        self._receivers: tuple[tuple[Inbox, ...], tuple[Inbox, ...]] = ((), ())
+        self._receivers: tuple[tuple[_Receiver, ...], tuple[_Receiver, ...]] = ((), ())
+        self._matched: list[tuple[LocalSubscription, Inbox]] = []
         self._inboxes: tuple[Inbox, ...] = ()
         self._limited: tuple[Inbox, ...] = ()
         self._size = _NOWHERE
@@ -103,13 +105,10 @@ class LocalPublisher:
         matched = [each for each in subscriptions if are_compatible(profile, each.ros.qos_profile)]
         # Nothing is handed over meanwhile: the middleware never counts so few.
         self._size = _NOWHERE
-        inboxes = [
+        inboxes = self._matched = [
             (each, each.inbox) for each in matched if each.inbox is not None and not each.waits
         ]
-        self._receivers = (
-            tuple(inbox for each, inbox in inboxes if not each.read_only),
-            tuple(inbox for each, inbox in inboxes if each.read_only),
-        )
+        self.follow_tracer()
         self._inboxes = tuple(inbox for _, inbox in inboxes)
         self._limited = tuple(inbox for _, inbox in inboxes if inbox.depth is None)
         turned_off = '' if self.is_local else 'local_delivery: false'
@@ -118,6 +117,17 @@ class LocalPublisher:
         self._has_sent = self._has_sent or bool(self.reason)
         self.reason = next(filter(None, reasons), '')
         self._size = len(matched)
+
+    def follow_tracer(self) -> None:
+        """Have what is handed over noted while the tracer is on."""
+        receivers = [
+            (each, TracedInbox(each.node, each.ros, inbox) if tracer.is_on else inbox)
+            for each, inbox in self._matched
+        ]
+        self._receivers = (
+            tuple(receiver for each, receiver in receivers if not each.read_only),
+            tuple(receiver for each, receiver in receivers if each.read_only),
+        )
 
     def is_heard(self) -> bool:
         """Return whether a message would go anywhere; count it, if not."""
@@ -197,6 +207,7 @@ class LocalPublisher:
 
 
 FindTap: TypeAlias = 'Callable[[LocalPublisher], Callable[[Any], None] | None]'
+_Receiver: TypeAlias = 'Inbox | TracedInbox'
 
 
 class LocalSubscription:
@@ -269,15 +280,37 @@ class LocalTopics:
         self._returns = not may_be_late(get_rmw_implementation_identifier(), os.environ)
         self._topics: defaultdict[tuple[str, type], _Topic] = defaultdict(_Topic)
         self._lock = threading.Lock()
-        self._find_tap: FindTap | None = None
+        self._finders: list[FindTap] = []
 
-    def tap(self, find_tap: FindTap | None) -> None:
+    def tap(self, find_tap: FindTap) -> None:
         """Have `find_tap` say for each publisher, now and later, who is told of its messages."""
+        self._finders.append(find_tap)
+        self.follow_taps()
+
+    def untap(self, find_tap: FindTap) -> None:
+        """Undo `tap`."""
+        self._finders.remove(find_tap)
+        self.follow_taps()
+
+    def follow_taps(self) -> None:
+        """Ask anew who is told of messages; the tracer is while it is on."""
         with self._lock:
-            self._find_tap = find_tap
             for topic in self._topics.values():
                 for publisher in topic.publishers:
-                    publisher.tap = find_tap and find_tap(publisher)
+                    self._tap_publisher(publisher)
+
+    def _tap_publisher(self, publisher: LocalPublisher) -> None:
+        taps = [tap for find_tap in self._finders if (tap := find_tap(publisher)) is not None]
+        if tracer.is_on:
+            name = publisher.node.get_fully_qualified_name()
+            taps.append(tracer.create_tap(name, publisher.ros.topic_name))
+
+        def tell_all(message: Any) -> None:
+            for tap in taps:
+                tap(message)
+
+        publisher.tap = (tell_all if taps[1:] else taps[0]) if taps else None
+        publisher.follow_tracer()
 
     def add_publisher(
         self, node: Any, ros: RosPublisher, *, is_local: bool = True
@@ -286,7 +319,7 @@ class LocalTopics:
         publisher = LocalPublisher(node, ros, is_local=is_local, returns=self._returns)
         with self._lock:
             topic = self._topic(ros)
-            publisher.tap = self._find_tap and self._find_tap(publisher)
+            self._tap_publisher(publisher)
             topic.publishers.append(publisher)
             publisher.connect(topic.subscriptions)
         return publisher

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from action_msgs.msg import GoalStatus
 
 from composer.errors import GoalTimeoutError
+from composer.runtime.tracing.tracer import COROUTINE, tracer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -94,12 +95,15 @@ class Goal:
             ActionNotAvailableError: The server ended, or an edit took the action client away.
             SystemStoppingError: A stop was requested while it waited.
         """
-        if not self._waits.until_done(self.result_future, timeout):
+        with tracer.waiting(self._waits.node, f"result of '{self._name}'"):
+            is_done = self._waits.until_done(self.result_future, timeout)
+        if not is_done:
             message = f"the goal of '{self._name}' did not end within {timeout:g} s"
             raise GoalTimeoutError(message)
         return self.result_future.result().result
 
     async def result_async(self) -> Any:
         """As `result`, without holding a thread while it waits."""
-        await self._waits.until_done_async(self.result_future, None)
+        with tracer.waiting(self._waits.node, f"result of '{self._name}'", COROUTINE):
+            await self._waits.until_done_async(self.result_future, None)
         return self.result_future.result().result

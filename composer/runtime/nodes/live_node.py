@@ -125,6 +125,7 @@ class LiveNode:
     def __post_init__(self) -> None:
         """Keep its name with its namespace: others ask for it when it is gone."""
         self.full_name = str(self.ros.get_fully_qualified_name())
+        self.running.node = self.waits.node = self.full_name
 
     def group(self, name: str | None) -> CallbackGroup:
         """Return the callback group of this name; `None` is the node's own."""
@@ -337,7 +338,8 @@ class LiveNode:
 
     def count_missed(self, owner: Owner, entity: Any, inbox: Inbox | None = None) -> None:
         """Count in the health of an entity what its ROS entity, and its inbox, have missed."""
-        counter = count_missed(self.system.executor, self.ros, entity, inbox)
+        counter = count_missed(self.system.executor, self.ros, entity, inbox, str(owner))
+        counter.node = self.full_name
         health = self.counted[owner] = self._health(owner)
         health.follow(counter, counter.queued)
         health.rest(rests=self.gate.rests)

@@ -58,13 +58,15 @@ def do_at_once(
     return results()
 
 
-def ask_all(workers: Sequence[Worker], what: str, *arguments: Any) -> dict[str, Any]:
+def ask_all(
+    workers: Sequence[Worker], what: str, *arguments: Any, timeout_sec: float = ANSWER_SEC
+) -> dict[str, Any]:
     """Return what each worker answers that does in time, by name."""
     answers: dict[str, Any] = {}
 
     def ask(worker: Worker) -> None:
         with suppress(ComposerError):
-            answers[worker.name] = worker.call(what, *arguments, timeout_sec=ANSWER_SEC)
+            answers[worker.name] = worker.call(what, *arguments, timeout_sec=timeout_sec)
 
     alive = [each for each in workers if each.is_alive and each.has_imported]
     threads = [threading.Thread(target=ask, args=(each,), daemon=True) for each in alive]

@@ -27,6 +27,7 @@ from composer.runtime.behaviours.callables import (
 )
 from composer.runtime.logs import log_levels
 from composer.runtime.rewiring.fresh_modules import fresh_modules
+from composer.runtime.tracing.tracer import tracer
 from composer.runtime.workers.worker_system import WorkerSystem
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from composer.runtime.behaviours.requests import RequestFailure
     from composer.runtime.health.system_state import Outcome
     from composer.runtime.rewiring.edit import Edit
+    from composer.runtime.tracing.tracer import TracePart
     from composer.runtime.workers.assignment import Assignment, ImportRequest
 
 # Added to the number of a signal, as shells do.
@@ -85,7 +87,7 @@ class WorkerProcess:
             *(self.create, self.run_on_start),
             *(self.open, self.start_waiting, self.be_up, self.stop, self.end),
             *(self.ping, self.status, self.top, self.restart_node, self.find_hidden),
-            *(self.lose_servers, self.fail_request),
+            *(self.lose_servers, self.fail_request, self.begin_trace, self.end_trace),
             *(self.begin_edit, self.wait_for_goals, self.make_way, self.apply_edit),
             *(self.commit_edit, self.undo_edit, self.follow),
         )
@@ -256,6 +258,17 @@ class WorkerProcess:
     def fail_request(self, failure: RequestFailure) -> None:
         """End the call that waits for the response to a request."""
         self._running.take_failure(failure)
+
+    def begin_trace(self) -> None:
+        """Note what happens from now on; there may be no nodes yet."""
+        if self._system is None:
+            tracer.turn_on()
+        else:
+            self._system.begin_trace()
+
+    def end_trace(self) -> TracePart:
+        """Return what was noted."""
+        return self._running.end_trace()
 
     def begin_edit(self, snapshot: Snapshot) -> None:
         """Begin an edit; all that was imported last is part of it."""

@@ -299,9 +299,9 @@ class Workers:
                 hidden |= worker.call('find_hidden', timeout_sec=ANSWER_SEC)
         return hidden
 
-    def ask(self, what: str, *arguments: Any) -> dict[str, Any]:
+    def ask(self, what: str, *arguments: Any, timeout_sec: float = ANSWER_SEC) -> dict[str, Any]:
         """Return what each worker answers that does, by name."""
-        return ask_all(self._list(), what, *arguments)
+        return ask_all(self._list(), what, *arguments, timeout_sec=timeout_sec)
 
     def describe(self) -> list[dict[str, Any]]:
         """Return the state of each worker, with the nodes that run in it."""

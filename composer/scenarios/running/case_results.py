@@ -26,6 +26,7 @@ class CaseRequest:
         real_time_limit_sec: The run is ended after so much real time; `None` for what the case
             says.
         trace: A file to write each event to; empty for none.
+        timeline: A file to write what callbacks did to, as JSON; empty for none.
         captures: Whether to keep what behaviours print, instead of showing it.
     """
 
@@ -35,6 +36,7 @@ class CaseRequest:
     shuffle: int = 0
     real_time_limit_sec: float | None = None
     trace: str = ''
+    timeline: str = ''
     captures: bool = True
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, ExitCode, StartError
@@ -14,6 +16,7 @@ from composer.language.values.parameter_values import StartingValues
 from composer.recordings.reading import read_recording
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.parameter_types import convert_parameter_value, infer_parameter_type
+from composer.runtime.tracing.tracer import tracer
 from composer.scenarios.expectations.evaluation import evaluate
 from composer.scenarios.expectations.log_expectations import START, expects_refusal
 from composer.scenarios.running.case_results import CaseFailure, CaseResult
@@ -31,6 +34,7 @@ from composer.scenarios.times import NANOSECONDS
 from composer.simulation.events import Event
 from composer.simulation.simulated_system import SimulatedSystem
 from composer.simulation.trace import render_event
+from composer.virtual_time.clocks import MONOTONIC_START_NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,10 +63,16 @@ def run_case(loaded: LoadedScenarios, case: CaseSpec, request: CaseRequest) -> C
         run = _CaseRun(loaded, case, seed, request)
     except ComposerError as error:
         return CaseResult((CaseFailure('start', str(error)),), seed)
+    if request.timeline:
+        tracer.turn_on(MONOTONIC_START_NS)
     failures = run.run()
     simulated = run.simulated
     if request.trace:
         _write_trace(request.trace, simulated)
+    if request.timeline:
+        part = tracer.take(())
+        end_ns = part.begun_ns + int(run.simulated_sec * 1e9)
+        Path(request.timeline).write_text(json.dumps(part._replace(ended_ns=end_ns)))
     if not any(failure.kind in ('start', 'stuck') for failure in failures):
         found = evaluate(case, run.events, run.steps.outcomes(), parameters=run.parameters)
         failures += [describe_failure(loaded, each, run.events) for each in found]
