@@ -31,7 +31,7 @@ ROOMS = (
     *('yaml_text', 'expressions', 'schema', 'ros_parameters', 'language', 'network', 'interfaces'),
     *(
         'python_source',
-        'inference',
+        'node_uses',
         'checks',
         'planning',
         'drawing',

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from composer.ament import find_meant_package
 from composer.checks.connections.topology import Topology, add_created, build_topology
 from composer.diagnostics import Related, diagnostic_at
-from composer.inference.behaviour_reader import BehaviourReader
-from composer.inference.message_types import MessageTypes
+from composer.interfaces.message_types import MessageTypes
 from composer.language.bindings import Binding, exit_bindings, node_bindings
 from composer.language.specs import DeclaredEndSpec
+from composer.node_uses.behaviour_reader import BehaviourReader
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from composer.diagnostics import Diagnostic, Remarks, Span
-    from composer.inference.reading import Reading
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.interfaces.declared_packages import DeclaredPackages
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import EndSpec, NodeSpec, SystemSpec
+    from composer.node_uses.reading import Reading
     from composer.python_source.module_finder import ModuleFinder
     from composer.yaml_text.positions import DataPath
 
@@ -62,8 +62,7 @@ class CheckContext:
         # A copy asks, so that no circle keeps this context until garbage is collected: for a
         # large system that would stop its callbacks for long, after each edit.
         asked = replace(self)
-        names = {each.behaviour.module: None for each in self.all_bindings()}
-        return BehaviourReader(self.modules, self.catalogue, asked.has_real_type, names)
+        return BehaviourReader(self.modules, asked.has_real_type)
 
     @cached_property
     def incomplete(self) -> set[DataPath]:

@@ -10,8 +10,8 @@ from composer.stubs.stored_names import type_of_state
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from composer.inference.reading import CreatedEntity
     from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.node_uses.reading import CreatedEntity
 
 # The types of the entities of one section, by name. Behaviours create some whose name or type is
 # not known: that is empty.

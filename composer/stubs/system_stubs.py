@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
-    from composer.inference.reading import CreatedEntity
     from composer.language.specs import NodeSpec
+    from composer.node_uses.reading import CreatedEntity
     from composer.stubs.node_shapes import NodeShape
     from composer.stubs.project_modules import ProjectModule
 

@@ -72,7 +72,7 @@ def test_many_different_findings_are_found_at_once():
     assert len(re.findall(r'error\[', text)) >= 15
 
 
-@pytest.mark.parametrize('path', [*sorted((DATA / 'valid').glob('*.yaml')), *SHIPPED], ids=str)
+@pytest.mark.parametrize('path', [*sorted((DATA / 'valid').rglob('*.yaml')), *SHIPPED], ids=str)
 def test_nothing_is_said_of_a_valid_file(path):
     findings = check_system(load_system(path), InterfaceCatalogue())
     assert [render_finding(finding) for finding in findings] == []

@@ -34,7 +34,7 @@ FOR_PEOPLE = {
     'missing-await', 'missing-middleware', 'missing-parameter', 'missing-return',
     'needs-root', 'never-ends', 'no-clock', 'no-definitions', 'no-effect', 'no-event-loop',
     'no-lifecycle', 'no-network-path', 'no-value', 'not-handed-over', 'nothing-expected',
-    'nothing-to-run', 'overridden-parameter', 'possible-deadlock', 'process-elsewhere',
+    'nothing-to-run', 'overridden-parameter', 'process-elsewhere',
     'read-only-message', 'relay-loop', 'second-server', 'service-deadlock',
     'shared-across-workers', 'too-many-entries', 'type-mismatch',
     'unevaluated-expression', 'uninstalled-package', 'unknown-executable',

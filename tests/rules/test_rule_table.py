@@ -26,7 +26,7 @@ SPEAKING = (
     'ros_parameters',
     'language',
     'interfaces',
-    'inference',
+    'node_uses',
     'checks',
     'scenarios',
     'application',

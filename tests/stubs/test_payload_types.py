@@ -81,7 +81,6 @@ REFUSED = {
         "{'dat': node.name}",
         "['x']",
         '3',
-        'node.now()',
     ],
     'twist': ["{'linaer': {'x': 1}}", "{'linear': {'xx': 1}}", "{'linear': {'x': 'fast'}}", "'x'"],
     'status': [

@@ -14,7 +14,7 @@ from composer.stubs.checking.kept_types import TypesCheck
 
 DATA = Path(__file__).resolve().parent.parent / 'data'
 TYPED = DATA / 'typed'
-VALID = sorted(path.parent for path in (DATA / 'valid' / 'idioms').rglob('system.yaml'))
+VALID = sorted((DATA / 'valid' / 'robots').glob('*.yaml'))
 
 pytestmark = [
     pytest.mark.ros,
@@ -53,10 +53,10 @@ def test_every_error_is_found_in_its_line_and_no_other_line(typed):
     assert finding.message.startswith("sensor_msgs/msg/LaserScan has no field 'LONGEST'")
 
 
-@pytest.mark.parametrize('folder', VALID, ids=lambda folder: folder.name)
-def test_right_programs_are_not_reported(folder, monkeypatch):
-    monkeypatch.chdir(folder)
-    assert [str(each.span) for each in find_by_types(Path('system.yaml'))] == []
+@pytest.mark.parametrize('file', VALID, ids=lambda file: file.stem)
+def test_right_programs_are_not_reported(file, monkeypatch):
+    monkeypatch.chdir(file.parent)
+    assert [str(each.span) for each in find_by_types(Path(file.name))] == []
 
 
 def test_what_two_checks_find_is_said_once(typed, capsys):

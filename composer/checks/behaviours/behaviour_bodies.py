@@ -13,6 +13,10 @@ from composer.checks.references import describe_missing_type
 from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import KIND_OF_NOUN, PUBLISHED, TYPE_FOLDERS
 from composer.names import join_names
+from composer.node_uses.literals import find_problems
+from composer.node_uses.message_uses import check_message_uses
+from composer.node_uses.reading import Problem
+from composer.node_uses.wires import type_in
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 
@@ -21,10 +25,11 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.reading import Reading, RemoteParameter
     from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.node_uses.reading import Reading, RemoteParameter
+    from composer.node_uses.wires import Wire
     from composer.python_source.modules import ModuleSource
 
 Readings = list[tuple['Binding', 'Reading']]
@@ -38,7 +43,7 @@ def bound_at(context: CheckContext, binding: Binding) -> Related:
 def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use fields, attributes and names of `node.state` that exist; each place once."""
     found: dict[tuple[Span, str], Diagnostic] = {}
-    used = _publishing_behaviours(context)
+    used, given = _publishing_behaviours(context), _given_types(context)
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
@@ -46,7 +51,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
             if not context.was_dropped(binding.behaviour.path)
         ]
         for finding in (
-            *_explain_problems(context, readings),
+            *_explain_problems(context, node, readings, given),
             *_check_state(context, node, readings),
             *_check_own_state(context, readings),
             *_check_remote_parameters(context, node, readings),
@@ -58,10 +63,37 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     yield from found.values()
 
 
-def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
+def _given_types(context: CheckContext) -> dict[str, tuple[set[str | None], set[str]]]:
+    """Return the types of messages that each behaviour is given, and the nodes it is bound to."""
+    found: dict[str, tuple[set[str | None], set[str]]] = {}
+    for node in context.spec.nodes.values():
+        for binding in context.bindings(node):
+            wire = context.behaviours.wire_of(node, binding)
+            types, nodes = found.setdefault(binding.behaviour.name, (set(), set()))
+            types.add(wire.given)
+            nodes.add(node.key)
+    return found
+
+
+def _explain_problems(
+    context: CheckContext,
+    node: NodeSpec,
+    readings: Readings,
+    given: dict[str, tuple[set[str | None], set[str]]],
+) -> Iterator[Diagnostic]:
     for binding, reading in readings:
-        for each in reading.problems:
-            if each.rule == 'bad-signature' and _has_lost_arguments(context, binding):
+        wire = context.behaviours.wire_of(node, binding)
+        # A behaviour that is given several types tells them apart in its own way.
+        types, binders = given[binding.behaviour.name]
+        problems = [
+            *reading.problems,
+            *_check_payloads(context, node, wire, reading, binders),
+            *check_message_uses(context.types, wire, reading, is_one=len(types) == 1),
+            *_check_values_needed(node, reading),
+        ]
+        returned = context.types.describe(wire.returned) if wire.returned else None
+        for each in problems:
+            if each.rule == 'missing-return' and returned and not returned.fields:
                 continue
             if is_shipped(context, binding.behaviour.module):
                 if is_called_wrongly(context, binding):
@@ -76,16 +108,40 @@ def _explain_problems(context: CheckContext, readings: Readings) -> Iterator[Dia
                 each.message,
                 help=each.help,
                 related=[
-                    *([Related('it is used here', each.used_at)] if each.used_at else []),
                     bound_at(context, binding),
                 ],
             )
 
 
-def _has_lost_arguments(context: CheckContext, binding: Binding) -> bool:
-    """Return whether arguments of a behaviour have errors that were reported already."""
-    owner = binding.behaviour.path[:-1]
-    return any(path[: len(owner)] == owner for path in context.system.dropped)
+def _check_payloads(
+    context: CheckContext, node: NodeSpec, wire: Wire, reading: Reading, binders: set[str]
+) -> Iterator[Problem]:
+    """Check the payloads that are written out in the code."""
+    for each in reading.payloads if context.catalogue.available else ():
+        if each.section:
+            type_name = type_in(node, each.section, each.name, context.has_real_type)
+        else:
+            type_name = getattr(wire, each.name)
+        if type_name is None:
+            continue
+        # Of several nodes, each may have another type under the name.
+        is_one = len(binders) == 1
+        problems = find_problems(context.types, f'{type_name}{each.part}', each.value, each.module)
+        for problem in problems:
+            if is_one or each.is_certain or (problem.help or '').startswith('did you mean'):
+                yield problem
+
+
+def _check_values_needed(node: NodeSpec, reading: Reading) -> Iterator[Problem]:
+    """Check that parameters have a value where nothing asks whether they have one."""
+    if node.has_other_parameters or node.parameter_files:
+        return
+    for name, place in reading.values_needed:
+        parameter = node.parameters.get(name)
+        if parameter is not None and parameter.value is None and parameter.type is not None:
+            text = f"the parameter '{name}' has no value until something sets it: this may be None"
+            help_text = 'give it a default, or ask whether it is None'
+            yield Problem('no-value', text, place, help_text)
 
 
 def _publishing_behaviours(context: CheckContext) -> set[str]:
@@ -258,8 +314,8 @@ def _explain_refusal(
 ) -> Iterator[Diagnostic]:
     """Report a value that the node refuses."""
     reason = None
-    if each.value is not None and each.value.value is not None and parameter.type:
-        value = each.value.value
+    if each.value is not None and parameter.type:
+        value = each.value
         reason = find_type_problem(value, parameter.type) or find_refusal(parameter, value)
     if parameter.read_only and each.value is not None:
         reason = 'it is read-only'

@@ -8,9 +8,9 @@ import sys
 from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related, diagnostic_at
-from composer.inference.module_names import TopNames
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
+from composer.python_source.top_names import TopNames
 from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 

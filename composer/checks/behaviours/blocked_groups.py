@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING, TypeAlias
 from composer.checks.behaviours.behaviour_bodies import bound_at
 from composer.checks.connections.deadlocks import group_in
 from composer.diagnostics import Related, diagnostic_at
-from composer.inference.evaluation.waiting import FILLING, shown
-from composer.inference.values import Held
 from composer.language.bindings import node_bindings
+from composer.node_uses.waiting import FILLING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from collections.abc import Set as AbstractSet
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.reading import Awaited, Block, Reading
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
+    from composer.node_uses.reading import Awaited, Block, Reading
 
 # What brings about what is waited for.
 _VERBS = {
@@ -48,11 +47,9 @@ def check_blocked_groups(context: CheckContext) -> Iterator[Diagnostic]:
             fillers = _find_fillers(context, waiter, block.what, every)
             if fillers and all(_is_blocked(waiter, each) for each in fillers):
                 found.setdefault(block.place, _explain(context, waiter, block, fillers[0]))
-        for seconds, place, length in waiter[2].sleeps:
+        for seconds, place in waiter[2].sleeps:
             if _is_long(waiter, seconds, every):
-                related = _elsewhere(place, [('until then', length)])
-                finding = _explain_length(context, waiter[1], seconds, place)
-                found.setdefault(place, finding.with_related(related))
+                found.setdefault(place, _explain_length(context, waiter[1], seconds, place))
     yield from found.values()
 
 
@@ -91,38 +88,31 @@ def _find_fillers(
     """Return the behaviours that bring about what one waits for; none if others may."""
     node, _, waiting = waiter
     several = every
-    if _is_of_state(what):
+    if what.owner == 'state':
         # Each node has its own.
         several = [each for each in every if each[0] is node]
         if any(reading.is_state_open for _, _, reading in several):
             return []
-    if waiting.reaches_ros or what in waiting.asked or getattr(what, 'is_lost', False):
+    if waiting.reaches_ros or what in waiting.asked:
         return []
     # Those who wait at a barrier are those who open it.
     if what in waiting.fills and what.kind != 'threading.Barrier':
         return []
     fillers = [each for each in several if each is not waiter and _may_fill(each[2], what)]
     is_beside = any(False in reading.fills.get(what, ()) for _, _, reading in fillers)
-    names: AbstractSet[str] = FILLING.get(what.kind) or {_name_of(what)}
+    names: AbstractSet[str] = FILLING.get(what.kind) or {what.name}
     for _, _, reading in several:
         if names & context.behaviours.mentions(reading).attributes:
             return []
     return [] if is_beside or not any(what in each[2].fills for each in fillers) else fillers
 
 
-def _name_of(what: Awaited) -> str:
-    return what.name if isinstance(what, Held) else ''
-
-
 def _may_fill(reading: Reading, what: Awaited) -> bool:
     """Return whether a behaviour brings something about, or changes it in another way."""
     if what in reading.fills:
         return True
-    return _is_of_state(what) and any(use.name == _name_of(what) for use in reading.state_read)
-
-
-def _is_of_state(what: Awaited) -> bool:
-    return isinstance(what, Held) and (what.kind == 'state' or what.kind in FILLING)
+    is_of_state = what.owner == 'state'
+    return is_of_state and any(use.name == what.name for use in reading.state_read)
 
 
 def _is_blocked(waiter: _Read, filler: _Read) -> bool:
@@ -152,17 +142,24 @@ def _explain(context: CheckContext, waiter: _Read, block: Block, filler: _Read) 
     return diagnostic_at(
         block.place,
         'blocked-group',
-        f'{binding.owner} waits for {shown(block.what)}, {reason}',
+        f'{binding.owner} waits for {_shown(block.what)}, {reason}',
         help=help_text,
         related=[
-            *_elsewhere(block.place, block.related),
+            *_elsewhere(block.place, 'it is called here', block.called_at),
+            *_elsewhere(block.place, 'it is made here', block.what.made_at),
             bound_at(context, binding),
             bound_at(context, filling),
         ],
     )
 
 
-def _elsewhere(place: Span, several: Iterable[tuple[str, Span]]) -> list[Related]:
-    """Return the places that are in other lines."""
-    here = (place.source, place.line)
-    return [Related(text, span) for text, span in several if (span.source, span.line) != here]
+def _shown(what: Awaited) -> str:
+    if what.made_at is not None:
+        return what.name
+    return f"'node.state.{what.name}'" if what.owner == 'state' else f"'{what.name}'"
+
+
+def _elsewhere(place: Span, text: str, other: Span | None) -> list[Related]:
+    """Return a place that is in another line."""
+    is_elsewhere = other and (other.source, other.line) != (place.source, place.line)
+    return [Related(text, other)] if other and is_elsewhere else []

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.missing_names import KINDS, Library
 from composer.diagnostics import Span, diagnostic_at
-from composer.inference.current_run import span_of
-from composer.inference.module_names import TopNames
-from composer.inference.values import Place
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
+from composer.python_source.places import span_of
+from composer.python_source.top_names import TopNames
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, suggest
 
@@ -206,7 +205,7 @@ class _Walk:
             # It may be bound where nobody looks, unless it is only misspelt.
             nearest = find_nearest(alias.name, known)
             top = TopNames(source.body)
-            bound = top.statements.keys() | top.changed
+            bound = top.statements.keys() | top.stored_again
             is_bound = top.is_open or alias.name in bound or alias.name[:2] == '__'
             if not top.is_dynamic and (nearest or not is_bound):
                 message = f"{home} has no '{alias.name}'"
@@ -229,7 +228,7 @@ def _is_of_python(name: str) -> bool:
 def _place_of(node: ast.Attribute | ast.alias, source: ModuleSource) -> Span:
     if isinstance(node, ast.alias):
         return _place_of_name(node, source)
-    return span_of(Place(source, node))
+    return span_of(source, node)
 
 
 def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:

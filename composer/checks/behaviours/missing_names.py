@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from composer.inference.message_types import PARTS, in_python
+from composer.interfaces.message_types import PARTS, in_python
 from composer.python_source.annotations import dotted_name, find_interface
 from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import list_nodes

@@ -13,9 +13,9 @@ from jinja2.exceptions import SecurityError
 
 from composer.expressions.evaluation import Evaluator
 from composer.expressions.sandbox import Method
-from composer.inference.message_types import MessageTypes
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
+from composer.interfaces.message_types import MessageTypes
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, suggest
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -15,18 +14,17 @@ from composer.entity_kinds import (
     NODE_BEHAVIOURS,
     USED_KINDS,
 )
-from composer.inference.values import ANY
 from composer.language.specs import NodeSpec
 from composer.spelling import find_nearest, is_short, is_typo, suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
     from composer.entity_kinds import EntityKind
-    from composer.inference.reading import NodeUse, Reading
     from composer.language.bindings import Binding
+    from composer.node_uses.reading import NodeUse, Reading
     from composer.yaml_text.positions import DataPath
 
 # Parameters that every node of rclpy declares.
@@ -94,7 +92,7 @@ def _check_names(
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
                     continue
                 made = [each for kind, each in created if kind == use.kind]
-                if None in made or _is_one_of(use.name, [each for each in made if each]):
+                if None in made or use.name in made:
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
@@ -142,17 +140,9 @@ def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> 
     """Return whether a node declares something, or may declare it under a misspelt key."""
     section = KIND_OF_NOUN[kind].section
     of_all = _OF_EVERY_NODE if kind == 'parameter' else set()
-    if _is_one_of(name, {*getattr(node, section), *of_all}):
+    if name in {*getattr(node, section), *of_all}:
         return True
     return any(path in ((section,), (section, name)) or _may_mean(path, section) for path in lost)
-
-
-def _is_one_of(name: str, known: Collection[str]) -> bool:
-    """Return whether a name is known, or may be; of one that is computed, parts are given."""
-    if ANY not in name:
-        return name in known
-    pattern = re.compile('.*'.join(map(re.escape, name.split(ANY))), re.DOTALL)
-    return any(map(pattern.fullmatch, known))
 
 
 def _is_unknown(path: DataPath) -> bool:
@@ -169,8 +159,7 @@ def _explain_name(
     context: CheckContext, node: NodeSpec, binding: Binding, use: NodeUse
 ) -> Diagnostic:
     kind = KIND_OF_NOUN[use.kind]
-    name = use.name.replace(ANY, '…')
-    declares_not = f"node '{node.name}' declares no {use.kind} '{name}'"
+    declares_not = f"node '{node.name}' declares no {use.kind} '{use.name}'"
     rule = f'unknown-{kind.slug}'
     message = declares_not
     if use.is_optional:
@@ -181,7 +170,7 @@ def _explain_name(
         rule,
         message,
         help=suggest(
-            name,
+            use.name,
             getattr(node, kind.section),
             'it declares',
             f"declare it under '{kind.section}:'",

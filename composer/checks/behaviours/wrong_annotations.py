@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.inference.message_types import in_python
+from composer.interfaces.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.python_source.annotations import Annotation, read_annotation
 from composer.python_source.function_kinds import FunctionKind
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.inference.wires import Wire
     from composer.interfaces.descriptions import MessageDescription
     from composer.language.specs import BehaviourSpec
+    from composer.node_uses.wires import Wire
     from composer.python_source.syntax import FunctionNode
 
 _RULE = 'wrong-annotation'
@@ -62,7 +62,7 @@ def _find_problems(context: CheckContext, behaviour: BehaviourSpec, wire: Wire) 
     if items:
         yield from _check_payload(context, 'yields', items[0], wire.yielded)
     if items and source.kind is FunctionKind.GENERATOR and len(items) > _RETURNED:
-        yield from _check_payload(context, 'returns', items[_RETURNED], wire.ended)
+        yield from _check_payload(context, 'returns', items[_RETURNED], wire.returned)
 
 
 # The index of the returned type in `Generator[yielded, sent, returned]`.

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from composer.checks.connections.topology import Channel, Endpoint
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.reading import NodeUse, Waited
     from composer.language.bindings import Binding
+    from composer.node_uses.reading import NodeUse, Waited
     from composer.yaml_text.positions import DataPath
 
+_RULE = 'service-deadlock'
 # Of a chain of calls, how many are named.
 _MOST_SHOWN = 8
 
@@ -60,7 +61,6 @@ class _Wait:
     place: Span
     answering: DataPath
     answering_group: Group | None
-    is_guess: bool
 
     @property
     def path(self) -> DataPath:
@@ -93,18 +93,10 @@ def _find_waits(context: CheckContext) -> Iterator[_Wait]:
                 continue
             group = group_in(node, binding)
             for use in _waiting_uses(context, node, binding):
-                ends = [
-                    servers.get((KIND_OF_NOUN[use.kind].section, node.full_name, name))
-                    for name in use.among
-                ]
-                channel, client = ends[use.among.index(use.name)] or (None, None)
-                if channel is None or client is None:
-                    continue
-                wait = _wait_of(node, binding, group, channel, client, use)
-                needs = {_need(end[0].providers[0], use.waits) if end else None for end in ends}
-                # Of several names, each may be the one that is used.
-                if len(ends) == 1 or (len(needs) == 1 and wait.answering_group):
-                    yield wait
+                section = KIND_OF_NOUN[use.kind].section
+                end = servers.get((section, node.full_name, use.name))
+                if end is not None:
+                    yield _wait_of(node, binding, group, *end, use)
 
 
 def _waiting_uses(context: CheckContext, node: NodeSpec, binding: Binding) -> list[NodeUse]:
@@ -139,7 +131,6 @@ def _wait_of(
         use.place,
         answering=(*server.path, part),
         answering_group=_need(server, use.waits),
-        is_guess=use.is_guess,
     )
 
 
@@ -200,7 +191,7 @@ def _check_hooks(context: CheckContext, waits: list[_Wait]) -> Iterator[Diagnost
             help_text = f"'{server.name}' has '{key}', and starts after '{wait.node.name}'"
         yield context.at_value(
             wait.path,
-            _rule_of([wait]),
+            _RULE,
             f'{wait} waits for {wait.what}, which answers only {when}',
             help=_HOOK_HELP.get(hook) if is_own else help_text,
             related=_places(context, [wait]),
@@ -277,17 +268,12 @@ def _explain(context: CheckContext, chain: list[_Wait]) -> Diagnostic:
         )
     return context.at_value(
         first.path,
-        _rule_of(chain),
+        _RULE,
         message,
         part=first.binding.behaviour.function,
         help=_help_for(last),
         related=_places(context, chain[:_MOST_SHOWN]),
     )
-
-
-def _rule_of(chain: list[_Wait]) -> str:
-    """Return the rule that waits break; of names that may be others, they may break it."""
-    return 'possible-deadlock' if any(wait.is_guess for wait in chain) else 'service-deadlock'
 
 
 def _places(context: CheckContext, chain: list[_Wait]) -> list[Related]:

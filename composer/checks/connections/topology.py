@@ -24,7 +24,6 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from composer.inference.reading import CreatedEntity
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import (
         ComponentSpec,
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
         QosSpec,
         SystemSpec,
     )
+    from composer.node_uses.reading import CreatedEntity
     from composer.yaml_text.positions import DataPath, SourceMap
 
 # An end that may exist: its channel, whether it provides, and its type, `None` for any.

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.checks.placement.crossings import Place, locate
 from composer.diagnostics import Related
-from composer.inference.sharing.shared_names import SharedNames
 from composer.language.bindings import exit_bindings
+from composer.node_uses.shared_names import SharedNames
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.inference.sharing.shared_functions import SharedName
     from composer.language.bindings import Binding
+    from composer.node_uses.shared_names import SharedName
 
 
 # Who uses a name, and the line.
@@ -29,7 +29,6 @@ class _Uses:
 
     read: _Users = field(default_factory=dict)
     changed: _Users = field(default_factory=dict)
-    made: _Users = field(default_factory=dict)
 
 
 def check_shared_objects(context: CheckContext) -> Iterator[Diagnostic]:
@@ -46,12 +45,11 @@ def check_shared_objects(context: CheckContext) -> Iterator[Diagnostic]:
         for users, found in (
             (known.read, uses.read),
             (known.changed, uses.changed),
-            (known.made, uses.made),
         ):
             for name, span in found.items():
                 users.setdefault(name, (binding, span))
     for place in places:
-        yield from _check(context, names, place, places)
+        yield from _check(context, place, places)
 
 
 _SEVERAL = 2
@@ -67,20 +65,17 @@ def _list_placed(context: CheckContext) -> Iterator[tuple[Place, Binding]]:
 
 
 def _check(
-    context: CheckContext, names: SharedNames, place: Place, places: dict[Place, _Uses]
+    context: CheckContext, place: Place, places: dict[Place, _Uses]
 ) -> Iterator[Diagnostic]:
     """Check what a place reads; where it is changed as well, each process may have its own."""
     uses = places[place]
     for name, (binding, span) in uses.read.items():
-        if names.find_touched(uses.changed, name):
+        if name in uses.changed:
             continue
-        is_made = names.find_touched(uses.made, name) is not None
         for other, theirs in places.items():
-            changes = theirs.changed if is_made else theirs.made | theirs.changed
-            changed = names.find_touched(changes, name) if other != place else None
-            if changed is None:
+            if other == place or name not in theirs.changed:
                 continue
-            changer, changed_at = changes[changed]
+            changer, changed_at = theirs.changed[name]
             yield context.at_value(
                 binding.behaviour.path,
                 'shared-across-workers',

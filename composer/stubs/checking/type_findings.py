@@ -10,9 +10,9 @@ import re
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.diagnostics import Span, diagnostic_at
-from composer.inference.message_types import in_python
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
+from composer.interfaces.message_types import in_python
 from composer.records import record
 from composer.spelling import suggest
 from composer.stubs.checking.received_values import changed_names, payload_of

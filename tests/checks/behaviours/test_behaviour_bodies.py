@@ -1,16 +1,9 @@
 """What is wrong in the body of a behaviour is found in its line; idioms of rclpy are not."""
 
-from pathlib import Path
 from textwrap import indent
 
 import pytest
 
-from composer.checks.checker import check_system
-from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system
-from composer.reports.text import render_finding
-
-IDIOMS = Path(__file__).parents[2] / 'data' / 'valid' / 'idioms'
 SYSTEM = """
   rover:
     parameters:
@@ -129,22 +122,13 @@ def odometry(node):
 """
 WRONG = {
     # what classes and dictionaries of the project have not
-    'print(Turn(linear={}, angul={}).angular)': 'unknown-attribute',
-    'print(Keeper(node).nodes)': 'unknown-attribute',
-    'print(Gear.LOWER)': 'unknown-attribute',
-    'print(Gear(3))': 'bad-call',
-    "print({'p': 1.0, 'i': 0.1}['d'])": 'bad-index',
-    # names, however they are reached
     "print(node.state['distance'])": 'unknown-attribute',
     "node.state['distance'] = 1.0": 'unknown-attribute',
     "node.state['distance'] += 1.0": 'unknown-attribute',
     "if m.pose: node.publish('comand', {})": 'unknown-publisher',
-    "if m.pose.pose.position.x > node.parameters.speed: node.publish('other', {})": 'unknown-publisher',
     "ok = m.pose and node.publish('comand', {})": 'unknown-publisher',
     "n = node; n.publish('comand', {})": 'unknown-publisher',
     "send = node.publish; send('comand', {})": 'unknown-publisher',
-    "getattr(node, 'publish')('comand', {})": 'unknown-publisher',
-    "functools.partial(node.publish, 'comand')({})": 'unknown-publisher',
     "pass_on(node, 'comand', {})": 'unknown-publisher',
     "[node.publish(name, {}) for name in ('command', 'comand')]": 'unknown-publisher',
     "(lambda: node.publish('comand', {}))()": 'unknown-publisher',
@@ -154,7 +138,6 @@ WRONG = {
     "print(node.parameters.get('sped', 1.0))": 'missing-parameter',
     "node.set_parameters('camera', {'gian': 1.0})": 'unknown-parameter',
     "node.set_parameters('camera', {'gain': 'high'})": 'refused-parameter',
-    "node.set_parameters(node.name, {'mode': 'fsat'})": 'refused-parameter',
     "node.set_parameters('camrea', {'gain': 1.0})": 'unknown-node',
     'node.parameters.speed = 2.0': 'unset-parameter',
     'print(node.state.distanse)': 'unknown-state',
@@ -163,198 +146,45 @@ WRONG = {
     "node.pubish('command', {})": 'unknown-attribute',
     "node.logger.wran('late')": 'unknown-attribute',
     'print(node.now.nanoseconds)': 'unknown-attribute',
-    "node.logger.info('%s', m)": 'bad-call',
     "node.publish('command')": 'bad-call',
-    'Vector3(1.0, 2.0)': 'bad-call',
     'pass_on(node)': 'bad-call',
     # names, round by round
-    "for i in range(2): node.publish(f'command{i}', {})": 'unknown-publisher',
-    "for n in ('command', 'other'): node.publish(n, {})": 'unknown-publisher',
-    "[node.publish(n, {}) for n in ('command', 'other') if n != 'command']": 'unknown-publisher',
-    "node.call('enable' if m.child_frame_id else 'other', True)": 'unknown-service-client',
-    "for n, value in {'command': {}, 'level': 256}.items(): pass_on(node, n, value)": 'field-range',
-    "p = {n: 1.0 for n in ('x', 'w')}; node.publish('command', {'linear': p})": 'unknown-field',
-    # what is read of messages
     'print(m.pose.pose.positon)': 'unknown-field',
-    "print(node.call('enable', True).sucess)": 'unknown-field',
-    "print(node.send_goal('count', 1).result().sequense)": 'unknown-field',
-    "for f in node.send_goal('count', 1).feedback: print(f.sequense)": 'unknown-field',
     'print(BatteryState.POWER_SUPPLY_STATUS_FULLL)': 'unknown-field',
-    "print(m['pose'])": 'unknown-field',
-    # what is given away
     "node.publish('command', {'liner': {}})": 'unknown-field',
     "node.publish('command', {'linear': {'X': 1.0}})": 'unknown-field',
-    "node.publish('command', Twist(linaer=Vector3()))": 'unknown-field',
     "t = Twist(); t.linear.X = 1.0; node.publish('command', t)": 'unknown-field',
-    "p = {}; p['liner'] = 1; node.publish('command', p)": 'unknown-field',
-    "Keeper(node).go({'liner': {}})": 'unknown-field',
     "node.publish('level', 'high')": 'field-type',
     # values that Python, or rclpy, does not take
-    "node.publish('scan', {'ranges': map(float, range(3))})": 'field-type',
-    "node.publish('scan', {'ranges': {1.0}})": 'field-type',
-    "node.publish('scan', {'ranges': (x for x in range(3))})": 'field-type',
-    "print('x: ' + m.pose.pose.position.x)": 'bad-call',
-    'print(1.0 - m.child_frame_id)': 'bad-call',
-    'print(-m.child_frame_id)': 'bad-call',
-    'print(m.pose.pose.position * 2)': 'bad-call',
-    'total = 0; total += m.child_frame_id': 'bad-call',
-    'print(m.child_frame_id > 3)': 'bad-call',
-    'print(math.sqrt(m.child_frame_id))': 'bad-call',
-    'print(len(m.pose.pose.position.x))': 'bad-call',
-    "print(','.join([m.pose.pose.position.x]))": 'bad-call',
-    'print(m.child_frame_id.split(1))': 'bad-call',
-    'for i in range(m.pose.pose.position.x): print(i)': 'bad-call',
-    'for each in m.pose: print(each)': 'bad-call',
-    "print(m.child_frame_id['a'])": 'bad-call',
-    "node.logger.info('x', throttle=1)": 'bad-call',
-    "node.logger.warning('x', throttle_duration_sec='1')": 'bad-call',
-    'node.logger.info(m)': 'bad-call',
-    "node.call('enable', True, timeout='5')": 'bad-call',
-    "node.publish({}, 'command')": 'bad-call',
     "node.create_timer('1.0', use)": 'bad-call',
-    "node.shutdown('bye')": 'bad-call',
     "node.create_publisher('std_msgs/msg/Strin', 'made')": 'unknown-type',
     "node.create_publisher('std_msg/msg/String', 'made')": 'unknown-type',
     "node.create_publisher('std_msgs/String', 'made')": 'unknown-type',
     "node.create_client('std_srvs/msg/SetBool', 'made')": 'unknown-type',
-    "node.create_publisher(Odometry, 'made'); node.publish('made', {'poze': {}})": 'unknown-field',
-    "node.create_publisher('std_msgs/msg/Int8', 'made'); node.publish('made', 1.5)": 'field-type',
-    "node.publish('scan', {'header': {'frame_id': pathlib.Path.home() / 'x'}})": 'field-type',
-    "node.publish('scan', {'header': {'frame_id': re.match('a', m.child_frame_id)}})": 'field-type',
-    't = Twist(); t.linear.x = 1': 'field-type',
-    'Vector3(y=len(m.child_frame_id))': 'field-type',
-    'x, y, z = m.pose.pose.position': 'bad-call',
-    'json.dumps({"at": m, "of": open("x")}, indent=2)': 'bad-call',
-    'node.parameters.names.strip()': 'unknown-attribute',
-    "print(node.parameters.gains['p'])": 'bad-call',
-    "node.publish('scan', {'header': {'frame_id': node.parameters.names}})": 'field-type',
-    "print(node.parameters.names == 'a')": 'never-equal',
-    # names of which a part is computed
-    "node.publish(f'comand_{m.child_frame_id}', {})": 'unknown-publisher',
-    "node.publish('comand_%s' % m.child_frame_id, {})": 'unknown-publisher',
-    "node.publish('comand_' + m.child_frame_id, {})": 'unknown-publisher',
-    "node.publish('comand_{}'.format(m.child_frame_id), {})": 'unknown-publisher',
-    "node.publish('_'.join(['comand', m.child_frame_id]), {})": 'unknown-publisher',
-    "node.call(f'{m.child_frame_id}_go', True)": 'unknown-service-client',
-    "print(node.parameters[f'{m.child_frame_id}_speed'])": 'unknown-parameter',
-    "print(getattr(node.parameters, f'gain_{m.child_frame_id}'))": 'unknown-parameter',
     "node.publish('level', node.parameters.unset)": 'no-value',
     'print(node.parameters.unset * 2)': 'no-value',
     'print(m.pose.covariance[36])': 'bad-index',
-    'm.pose.covariance[-37] = 1.0': 'bad-index',
-    'print((1, 2)[2])': 'bad-index',
     'print(m.child_frame_id == 1)': 'never-equal',
-    'print(m == m.child_frame_id)': 'never-equal',
-    'print(m.pose.pose.position.x in ("a", "b"))': 'never-equal',
-    "node.publish('level', datetime.timedelta(seconds=1))": 'field-type',
-    "node.publish('scan', {'header': {'frame_id': pathlib.Path('/tmp')}})": 'field-type',
-    "node.publish('scan', {'header': {'frame_id': ValueError('x')}})": 'field-type',
-    "node.publish('level', rclpy.duration.Duration(seconds=1))": 'field-type',
     "node.publish('level', 256)": 'field-range',
-    "node.publish('level', m.pose.pose.position.x)": 'field-type',
     "node.publish('level', 'x' if m.pose else 1)": 'field-type',
-    "node.publish('level', 3 / 2)": 'field-type',
-    "node.publish('command', m)": 'field-type',
     "node.publish('scan', {'ranges': 1.0})": 'field-type',
-    "node.publish('cover', {'pose': {'covariance': [0.0] * 9}})": 'field-length',
     "node.call('enable', 'yes')": 'field-type',
     # payloads that are computed
-    "node.publish('command', dict(zip(('linear', 'angul'), ({}, {}))))": 'unknown-field',
-    "node.publish('command', dict.fromkeys(['linear', 'angul'], {}))": 'unknown-field',
-    "node.publish('command', dict([('linear', {}), ('angul', {})]))": 'unknown-field',
-    "node.publish('command', {'linear': {}} | {'angul': {}})": 'unknown-field',
-    "node.publish('command', copy.deepcopy({'angul': {}}))": 'unknown-field',
-    "node.publish('command', {name: {} for name in ('linear', 'angul')})": 'unknown-field',
-    "t = Twist(); [setattr(t, name, Vector3()) for name in ('linear', 'angul')]": 'unknown-field',
-    "node.publish('level', round(m.pose.pose.position.x, 1))": 'field-type',
-    "node.publish('level', divmod(7, 3))": 'field-type',
-    "node.publish('level', 1 << 8)": 'field-range',
-    "node.publish('level', max(100, 256))": 'field-range',
-    "node.publish('level', sum([200, 100]))": 'field-range',
-    "node.publish('level', len('x' * 300))": 'field-range',
-    "node.publish('level', int('2' + '56'))": 'field-range',
-    "for level in (1, 256): node.publish('level', level)": 'field-range',
-    "node.publish('level', '1,2'.split(','))": 'field-type',
-    "node.publish('level', math.pi)": 'field-type',
-    "node.call('enable', sum([True, True]))": 'field-type',
-    "node.publish('cover', {'pose': {'covariance': ([0.0] * 36)[1:]}})": 'field-length',
-    "ranges = [1.0]; ranges.append('x'); node.publish('scan', {'ranges': ranges})": 'field-type',
-    "node.publish('command', {**({'angul': {}} if m.pose else {})})": 'unknown-field',
-    "node.publish('command', {'linear': node.now()})": 'field-type',
     'for each in Path(poses=[]).poses: each.pose.x = 1.0': 'unknown-field',
-    "node.publish('level', poses)": 'field-type',
-    "node.publish('level', len)": 'field-type',
-    "node.publish('command', Twist)": 'field-type',
-    "node.publish('level', ~0)": 'field-range',
-    "node.publish('level', [1, 2][0:1])": 'field-type',
-    "node.publish('level', {'a': 1, 'b': 300}.get('b'))": 'field-range',
-    "node.publish('level', '%d' % 3)": 'field-type',
-    "node.publish('level', random.choice(['a', 'b']))": 'field-type',
-    "node.publish('scan', {'ranges': list(zip([1.0], [2.0]))})": 'field-type',
-    "node.publish('scan', {'header': {'stamp': node.now().nanoseconds}})": 'field-type',
-    "node.publish('cover', {'pose': {'covariance': sum([[0.0] * 6] * 5, [])}})": 'field-length',
-    "p = {'linear': {}}; p |= {'angul': {}}; node.publish('command', p)": 'unknown-field',
-    # what is read of what holds messages
-    'print([each.positon for each in poses(node) + poses(node)])': 'unknown-field',
-    'by = {p.header.frame_id: p for p in poses(node)}; print(by["map"].positon)': 'unknown-field',
-    'by = {}; by[m.child_frame_id] = m; print(by[m.child_frame_id].positon)': 'unknown-field',
-    'by = {}; by[m.child_frame_id] = m; print([p.positon for p in by.values()])': 'unknown-field',
-    'q = deque(maxlen=3); q.append(m); print(q.popleft().positon)': 'unknown-field',
-    'pair = (m, 1); print(pair[0].positon)': 'unknown-field',
-    "print({'m': m}.get('m').positon)": 'unknown-field',
-    'print((m or None).positon)': 'unknown-field',
-    # what is read of the items of arrays
-    'print(next(each for each in poses(node)).pos)': 'unknown-field',
-    'print([b.pos for a, b in itertools.pairwise(poses(node))])': 'unknown-field',
-    'print([b.pos for a, b in zip(poses(node), poses(node))])': 'unknown-field',
-    'print([each.pos for i, each in enumerate(poses(node), start=1)])': 'unknown-field',
-    'print([each.pos for each in reversed(poses(node))])': 'unknown-field',
-    'found = list(poses(node)); found.sort(key=lambda each: each.pos)': 'unknown-field',
-    'print(sorted(poses(node), key=lambda each: each.pos))': 'unknown-field',
-    'print(max(poses(node), key=lambda each: each.pose.position.x).pos)': 'unknown-field',
-    'print(functools.reduce(lambda total, each: total + each.pos, poses(node), 0))': 'unknown-field',
-    'print(list(filter(lambda each: each.pos, poses(node))))': 'unknown-field',
-    'print(list(map(lambda each: each.pos, poses(node))))': 'unknown-field',
-    'first, *rest = poses(node); print(first.pos)': 'unknown-field',
-    # where a message or the state decides, and not the file alone
-    'if m.pose.pose.position.x < node.parameters.speed: print(m.velocity)': 'unknown-field',
-    'print(m.velocity if abs(m.pose.pose.position.x - node.parameters.speed) > 1 else 0)': 'unknown-field',
-    'print(node.parameters.speed < m.pose.pose.position.x < 3 and m.velocity)': 'unknown-field',
-    'if m.child_frame_id == node.name: node.logger.warn_throttle("near")': 'unknown-attribute',
-    'if node.now().nanoseconds > node.parameters.speed: print(m.velocity)': 'unknown-field',
-    # payloads that are kept, or made elsewhere
-    "kept = node.own_state.setdefault('kept', [0, 0]); node.publish('command', kept)": 'field-type',
-    "node.publish('command', [c for c in 'ab' if c in m.child_frame_id] == [])": 'field-type',
-    'path = Path(); path.poses.append(m)': 'field-type',
-    'Turn(linear={})': 'bad-call',
-    "node.set_parameters('camera', 'gain', 2.0)": 'bad-call',
-    "node.set_parameters('camera', 'gain')": 'bad-call',
-    # coroutines, and what has no effect
     'Keeper(node).wait()': 'missing-await',
-    'found = [Keeper(node).wait() for _ in range(2)]; print(all(found))': 'missing-await',
     "node.call_async('enable', True)": 'missing-await',
     "kept = node.call_async('enable', True)": 'missing-await',
     "await node.publish('command', {})": 'missing-await',
     "await node.call('enable', True)": 'missing-await',
     "await node.send_goal('count', 1)": 'missing-await',
-    "await node.send_goal('count', 1).result()": 'missing-await',
-    "async for f in node.send_goal('count', 1).feedback: print(f)": 'missing-await',
     'await asyncio.sleep(m.pose.pose.position.x)': 'no-event-loop',
     "await asyncio.gather(node.call_async('enable', True))": 'no-event-loop',
     "await asyncio.wait_for(node.call_async('enable', True), 1)": 'no-event-loop',
-    "async with asyncio.timeout(1): await node.call_async('enable', True)": 'no-event-loop',
     'node.shutdown': 'no-effect',
-    "node.send_goal('count', 1).cancel": 'no-effect',
     "threading.Thread(target=pass_on(node, 'level', 1)).start()": 'no-effect',
-    "threading.Timer(1, pass_on(node, 'level', 1)).start()": 'no-effect',
     "threading.Thread(target=pass_on, args=(node, 'level', 1))": 'no-effect',
-    "node.get_parameters('camera', 'gain')": 'bad-call',
-    "node.set_parameters('camera', {'gain'})": 'bad-call',
-    "print(node.get_parameters('camera', ['gain']).gain)": 'unknown-attribute',
     'if node.parameters.speed > 1: node.parameters.speed = 1.0': 'unset-parameter',
-    'm': 'no-effect',
     'print(mesage)': 'undefined-name',
-    "try: node.publish('command', {'lat': 1.0})\nexcept ValueError: print()": 'unknown-field',
     "try: node.publish('command', {'lat': 1.0})\nexcept Exception: print()": 'unknown-field',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
 }
@@ -401,8 +231,6 @@ RIGHT = [
     "found = [bool(c) for c in 'ab']; print(all(found))",
     "if node.parameters.mode == 'fast': print(m.velocity)",
     'if node.parameters.speed > 2: print(m.velocity)',
-    'node.state.distance = node.parameters.speed\nif node.state.distance > 2: print(m.velocity)',
-    "if node.parameters.mode == 'fast': node.state.distance = 3\nif node.state.distance == 3: print(m.velocity)",
     "node.parameters.mode == 'fast' and m.pose.pose.position.x > 2 and print(m.velocity)",
     'if node.parameters.speed * 2 > 3: print(m.velocity)',
     "for n, on in (('command', True), ('other', False)): node.publish(n, {}) if on else None",
@@ -448,7 +276,6 @@ RIGHT = [
     "parts = [m.child_frame_id]; node.publish(*parts, 'command')",
     "for i in range(3):\n    if i == m.twist.twist.linear.x: break\nelse: node.publish('never', 1)",
     'if m.__class__ in (Twist,): print(m.linear)',
-    "match 3:\n    case str(): node.publish('level', 'three')\n    case int(level): node.publish('level', level)",
     "by = {'a': m}; by[m.child_frame_id] = Twist(); print(by['b'].linear, by['a'].linear)",
     "node.publish('level', random.choice([1, 'x']))",
     'q = deque([m], maxlen=3); q.appendleft(m); q.rotate(); print(q.pop().pose, tuple([m]).count(m))',
@@ -488,22 +315,10 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
     ('lines', 'mark'),
     [
         (
-            'if m.child_frame_id != node.parameters.mode: return\nprint(m.velocity)  # here',
-            '# here',
-        ),
-        (
-            'limit = node.parameters.speed\nif m.pose.pose.position.x > limit: return\n'
-            'print(m.velocity)  # here',
-            '# here',
-        ),
-        (
             'if node.state.distance > 3: return\nnode.state.distance += 1.0\n'
             'print(m.velocity)  # here',
             '# here',
         ),
-        ("node.publish('command', nested(2))", '# of NESTED'),
-        ("node.publish('command', dataclasses.asdict(Turn({}, {})))", '# of VARS'),
-        ('match m:\n    case Odometry(positon=where): print(where)  # here', '# here'),
     ],
 )
 def test_a_field_is_found_where_it_is_written(check, lines, mark):
@@ -521,17 +336,6 @@ def test_what_may_be_right_has_no_finding(check, line):
     assert found == []
 
 
-@pytest.mark.ros
-@pytest.mark.sampled
-@pytest.mark.parametrize(
-    'folder', sorted(IDIOMS.glob('*/system.yaml')), ids=lambda p: p.parent.name
-)
-def test_an_idiom_has_no_finding(folder, monkeypatch):
-    monkeypatch.chdir(folder.parent)
-    found = check_system(load_system(Path('system.yaml')), InterfaceCatalogue())
-    assert [render_finding(each) for each in found] == []
-
-
 ANSWERS = """
   rover:
     parameters: {speed: 1.0}
@@ -545,8 +349,6 @@ ANSWERS = """
 @pytest.mark.parametrize(
     ('answer', 'are_wrong'),
     [
-        ('GoalResponse.ACCEPT', (True, True)),
-        ('SetParametersResult(successful=True)', (True, True)),
         ('{"successful": True}', (True, True)),
         ('True', (False, True)),
         ('None', (False, False)),
@@ -555,8 +357,6 @@ ANSWERS = """
 )
 def test_an_answer_says_whether_or_why_not(check, answer, are_wrong):
     code = f"""
-        from rcl_interfaces.msg import SetParametersResult
-        from rclpy.action import GoalResponse
         def accept(node, goal):
             return {answer}
         def on_parameters(node, changes):
@@ -564,57 +364,9 @@ def test_an_answer_says_whether_or_why_not(check, answer, are_wrong):
         def drive(node, goal):
             return {{}}
         """
-    found = [(5, 'bad-answer'), (7, 'bad-answer')]
+    found = [(3, 'bad-answer'), (5, 'bad-answer')]
     wanted = [each for each, is_wrong in zip(found, are_wrong, strict=True) if is_wrong]
     assert check(ANSWERS, code) == wanted
-
-
-KEPT = """
-  rover:
-    state: {last: null, count: 0}
-    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
-    subscriptions:
-      odom: {type: nav_msgs/msg/Odometry, external: true, behaviour: parts:hear}
-    timers: {tick: {period: 1.0, behaviour: parts:tick, publish: level}}
-"""
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('kept', 'read', 'rule'),
-    [
-        ('state.last = m', 'state.last.positon', 'unknown-field'),
-        ('state.last = m', 'state.last and node.state.last.pose.positon', 'unknown-field'),
-        ('state.last = node.now()', '(node.now() - node.state.last).seconds', 'unknown-attribute'),
-        ('state.last = m if m.child_frame_id else node.now()', 'state.last.nanoseconds', None),
-        ('state.count = m', 'state.count.positon', 'unknown-field'),
-        ('state.last = m; setattr(node.state, str(m), 3)', 'state.last.positon', None),
-        ('state.last = m; node.state.last += 1', 'state.last.positon', 'unknown-field'),
-    ],
-)
-def test_what_is_kept_in_the_state_is_known_to_other_behaviours(check, kept, read, rule):
-    read = read if read.startswith('(') else f'node.{read}'
-    code = f'def hear(node, m):\n    node.{kept}\n\n\ndef tick(node):\n    print({read})\n    return 1\n'
-    assert check(KEPT, code) == ([(6, rule)] if rule else [])
-
-
-@pytest.mark.ros
-def test_what_a_behaviour_keeps_for_itself_is_known_to_it(check):
-    code = """
-        def hear(node, m):
-            before = node.own_state.get('before')
-            if before is not None:
-                print(before.positon)
-            node.own_state['before'] = m
-
-
-        def tick(node):
-            begin = node.own_state.setdefault('begin', node.now())
-            yield (node.now() - begin).seconds
-            return 'high'
-        """
-    found = check(KEPT, code)
-    assert found == [(5, 'unknown-field'), (11, 'unknown-attribute'), (12, 'field-type')]
 
 
 UNPUBLISHED = """
@@ -707,15 +459,15 @@ ANSWERED = (
 @pytest.mark.ros
 @pytest.mark.parametrize(('body', 'line'), UNANSWERED.items(), ids=UNANSWERED)
 def test_a_way_without_a_response_is_found(check, body, line):
-    assert check(ANSWER, f'def use(node, request):\n    {body}\n') == [(line, 'field-type')]
+    assert check(ANSWER, f'def use(node, request):\n    {body}\n') == [(line, 'missing-return')]
 
 
 @pytest.mark.ros
 @pytest.mark.parametrize(
     ('body', 'findings'),
     [
-        ('for n in range(3): yield {"sequence": [n]}', [(1, 'field-type')]),
-        ('yield {"sequence": [1]}\n    return', [(3, 'field-type')]),
+        ('for n in range(3): yield {"sequence": [n]}', [(1, 'missing-return')]),
+        ('yield {"sequence": [1]}\n    return', [(3, 'missing-return')]),
         ('yield {"sequence": [1]}\n    return {"sequence": [1]}', []),
         ('while True: yield {"sequence": [1]}', []),
         ('import itertools\n    for n in itertools.count(): yield {"sequence": [n]}', []),
@@ -734,7 +486,6 @@ DOUBTFUL = {
     f'import contextlib\n    with contextlib.suppress(OSError): {GIVES}': 1,
     f'if node.parameters.on: {GIVES}': 1,
     f'if node.name == "switch": {GIVES}': 1,
-    f'def answer(ok):\n        if ok: {GIVES}\n    return answer(request.data)': 4,
 }
 
 
@@ -751,78 +502,3 @@ def test_a_way_that_may_give_no_response_is_a_warning(check, body, line):
 @pytest.mark.parametrize('body', ANSWERED)
 def test_a_response_on_all_ways_has_no_finding(check, body):
     assert check(ANSWER, f'def use(node, request):\n    {body}\n') == []
-
-
-CREATED = """
-    def begin(node):
-        node.create_service('std_srvs/srv/Trigger', '~/go', go)
-
-
-    def go(node, request):
-        return {answer}
-    """
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('answer', 'rule'),
-    [
-        ('{"ok": True}', 'unknown-field'),
-        ('{"success": 1}', 'field-type'),
-        ('True', 'field-type'),
-        ('{"success": True}', None),
-        ('node.state.answer', None),
-    ],
-)
-def test_the_response_of_a_created_service_is_checked(check, answer, rule):
-    nodes = '\n  rover: {state: {answer: null}, on_start: parts:begin}\n'
-    found = check(nodes, CREATED.replace('{answer}', answer))
-    assert [each for _, each in found] == ([rule] if rule else [])
-
-
-RESULTS = """
-    def begin(node):
-        node.create_publisher('std_msgs/msg/Int8', 'made')
-        node.create_timer(1, give, publish={publish})
-        node.create_subscription('std_msgs/msg/Empty', '/in', hear, publish={publish})
-
-
-    {give}
-
-
-    def hear(node, message):
-        return None
-    """
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('publish', 'give', 'rules'),
-    [
-        ("'levl'", 'def give(node): return 1', ['unknown-publisher'] * 2),
-        ("'level'", "def give(node): return 'x'", ['field-type']),
-        ("'made'", "async def give(node): return 'x'", ['field-type']),
-        ("'made'", "def give(node):\n        yield 1\n        return 'x'", ['field-type']),
-        ("'made'", "def give(node):\n        yield {'dat': 1}", ['unknown-field']),
-        ("'level' if node.parameters.on else 'made'", 'def give(node): return 1', []),
-        (
-            "'levl' if node.parameters.on else 'made'",
-            'def give(node): return 1',
-            ['unknown-publisher'] * 2,
-        ),
-        ('node.state.out', "def give(node): return 'x'", []),
-        ('None', "def give(node): return 'x'", []),
-        ("'level'", 'def give(node): return 1 if node.parameters.on else None', []),
-    ],
-)
-def test_what_behaviours_of_created_entities_return_is_checked(check, publish, give, rules):
-    nodes = """
-  rover:
-    parameters: {on: true}
-    state: {out: level}
-    publishers: {level: {type: std_msgs/msg/Int8, external: true}}
-    on_start: parts:begin
-"""
-    found = check(nodes, RESULTS.replace('{publish}', publish).replace('{give}', give))
-    ignored = 'unused-parameter', 'unused-publisher'
-    assert [rule for _, rule in found if rule not in ignored] == rules

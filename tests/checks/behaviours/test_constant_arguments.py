@@ -1,7 +1,5 @@
 """Constant arguments, and what cannot be called as a behaviour at all."""
 
-from textwrap import dedent
-
 import pytest
 
 NODES = """
@@ -197,58 +195,6 @@ def test_what_takes_no_node_is_no_behaviour(check, behaviour, rule):
     """
     nodes = f'  n: {{on_start: "{behaviour}"}}\n'
     assert check(nodes, code) == ([(3, rule)] if rule else [])
-
-
-_MAKING = """
-    import functools
-    class Sector:
-        def see(self, node): ...
-        def turn(self, node, angle): ...
-        def __call__(self, node): ...
-    class Wide:
-        def __call__(self, node, angle): ...
-    def turn(node, angle): ...
-    def see(node): ...
-    def make(*wanted):
-        def made(node): ...
-        def made_of_two(node, angle): ...
-        return made_of_two if wanted else made
-    def passing(function):
-        @functools.wraps(function)
-        def wrapper(*args):
-            return function(*args)
-        return wrapper
-"""
-
-
-@pytest.mark.parametrize(
-    ('wrong', 'right'),
-    [
-        ('run = Sector.see', 'run = Sector().see'),
-        ('run = Sector().turn', 'run = functools.partial(Sector().turn, angle=1)'),
-        ('run = Wide()', 'run = Sector()'),
-        ('run = turn', 'run = see'),
-        (
-            'run: object = functools.partial(see, 1)',
-            'run: object = functools.partial(turn, angle=1)',
-        ),
-        ('run = make(1)', 'run = make()'),
-        ('run = lambda: 1', 'run = lambda node, angle=1: 1'),
-        (
-            'def deco(f):\n  return lambda node, m: f(node)\n@deco\ndef run(node): ...',
-            'def deco(f):\n  return lambda node, m=1: f(node, m)\n@deco\ndef run(node, m): ...',
-        ),
-        (
-            'def deco(f):\n def wrapper(): ...\n return wrapper\n@deco\ndef run(node): ...',
-            '@passing\ndef run(node): ...',
-        ),
-    ],
-)
-def test_what_is_made_in_a_module_is_called_as_it_is_bound(check, wrong, right):
-    making = dedent(_MAKING)
-    assert check('  n: {on_start: "parts:run"}\n', making + right) == []
-    ((_, rule),) = check('  n: {on_start: "parts:run"}\n', making + wrong)
-    assert rule == 'bad-signature'
 
 
 @pytest.mark.parametrize('patch', ['sys.modules[__name__].run = see', 'globals()["run"] = see'])

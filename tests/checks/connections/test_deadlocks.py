@@ -93,8 +93,6 @@ def test_a_service_in_a_group_of_its_own_answers(check):
         "if not node.own_state.get('seen'): return\n            node.call('set_it')",
         "try: float(node.name)\n            except ValueError: node.call('set_it')",
         "try: node.call('set_it')\n            except Exception: node.logger.warning('late')",
-        "node.call('set_it' if node.now().nanoseconds % 2 else 'too')",
-        "for name in ('set_it', 'too'): node.call(name)",
     ],
 )
 def test_a_wait_on_a_condition_of_the_running_system_never_gets_an_answer(check, body):

@@ -23,11 +23,6 @@ SHARED = [
         'Robot.pose',
     ),
     (
-        'class Robot:\n  pose = None\n  @classmethod\n  def move(cls): cls.pose = 1\n'
-        'def write(node): Robot.move()\ndef read(node): return Robot.pose',
-        'Robot.pose',
-    ),
-    (
         'class Robot: pass\nROBOT = Robot()\ndef write(node): ROBOT.pose = 1\n'
         'def read(node): return ROBOT.pose',
         'ROBOT.pose',
@@ -60,111 +55,6 @@ SHARED = [
     ),
     ('import store\ndef write(node):\n  s = store.STATE\n  s[1] = 1\ndef read(node): return store.STATE', 'STATE'),
     # Of a class, by an instance, or of its base.
-    (
-        'class Robot:\n  poses = []\n  def move(self): self.poses.append(1)\n'
-        'def write(node): Robot.move(Robot())\ndef read(node): return Robot.poses',
-        'Robot.poses',
-    ),
-    (
-        'class Robot:\n  poses = []\n'
-        'class Arm(Robot):\n  def look(self): return self.poses\n'
-        'def write(node): Robot.poses.append(1)\ndef read(node): return Arm.look(Arm())',
-        'Robot.poses',
-    ),
-]  # fmt: skip
-# Objects that functions, classes and calls keep: `write` and `read`, after what they share.
-WORLD = """
-class World:
-    _instance = None
-    def __init__(self): self.people, self.size = {}, 9
-    def add(self, name): self.people[name] = 1
-    @property
-    def count(self): return len(self.people)
-    @classmethod
-    def get(cls):
-        if cls._instance is None: cls._instance = cls()
-        return cls._instance
-"""
-LAZY = """
-_world = None
-def get():
-    global _world
-    if not _world: _world = World()
-    return _world
-"""
-KEPT = [
-    # One object of a class.
-    (WORLD, 'World.get().people[1] = 1', 'World.get().people', 'World._instance.people'),
-    (WORLD, "w = World.get(); w.add('x')", 'World.get().count', 'World._instance.people'),
-    (WORLD + LAZY, 'get().add(1)', 'get().count', '_world.people'),
-    (WORLD + 'W = World()', 'W.add(1)', 'W.count', 'W.people'),
-    (WORLD + 'W = World()\ndef get(): return W', 'get().size = 1', 'get().size', 'W.size'),
-    (
-        'class One:\n  _one = None\n  def __new__(cls):\n    if not cls._one:\n'
-        '      cls._one = super().__new__(cls)\n      cls._one.x = 0\n    return cls._one',
-        *('One().x = 1', 'One().x', 'One._one.x'),
-    ),
-    ('class Singleton: pass\nclass One(Singleton): pass', 'One().x = 1', 'One().x', 'One().x'),
-    (
-        'class One(metaclass=SingletonMeta): pass',
-        *('o = One(); o.x = 1', 'One().x', 'One().x'),
-    ),
-    (
-        'class Borg:\n  _all = {}\n  def __init__(self): self.__dict__ = self._all',
-        *('Borg().x = 1', 'Borg().x', 'Borg().x'),
-    ),
-    # What a cached function made.
-    (
-        'from functools import cache\n@cache\ndef get(): return {}',
-        *("get()['x'] = 1", "get()['x']", 'get()'),
-    ),
-    (
-        WORLD + 'import functools as f\n@f.lru_cache(maxsize=2)\ndef get(x): return World()',
-        *("get('a').add(1)", "get('a').count", "get('a').people"),
-    ),
-    # Attributes of functions, defaults of parameters, variables of the function that made one.
-    ('def f(): pass\nf.seen = []', 'f.seen.append(1)', 'f.seen', 'f.seen'),
-    ('def f(): f.n += 1\nf.n = 0', 'f()', 'f.n', 'f.n'),
-    ('def get(found={}): return found', 'get()[1] = 1', 'get()', 'get.found'),
-    (
-        'def make():\n  n = 0\n  def up():\n    nonlocal n\n    n += 1\n'
-        '  def get(): return n\n  return up, get\nup, get = make()',
-        *('up()', 'get()', 'up.n'),
-    ),
-    # What a function is given.
-    ('S = []\ndef put(to): to.append(1)\ndef get(of): return of[0]', 'put(S)', 'get(S)', 'S'),
-]  # fmt: skip
-UNSHARED = [
-    # Each process makes its own, and only reads it.
-    (WORLD, 'World.get().size', 'World.get().size'),
-    (WORLD + LAZY, 'get().count', 'get().count'),
-    ('from functools import cache\n@cache\ndef load(p): return open(p)', "load('a')", "load('a')"),
-    ('f = open\nm = None\ndef get():\n  global m\n  if m is None: m = f(1)\n  return m\n'
-     'def free():\n  global m\n  m = None', 'free()', 'get()'),
-    # Others change another part of it, or another object.
-    (WORLD, 'World.get().add(1)', 'World.get().size'),
-    ('from functools import cache\n@cache\ndef get(x): return {}', 'get(1)[1] = 1', 'get(2)'),
-    (WORLD + 'def get(): return World()', 'get().add(1)', 'get().count'),
-    ('def get(found={}): return found', 'get({})[1] = 1', 'get()'),
-    ('def get(found={}): return found', 'get(found={})[1] = 1', 'get()'),
-    ('def f(x=None):\n  if x is None: x = []\n  x.append(1)\n  return x', 'f()', 'f.n'),
-    (
-        'def make():\n  n = 0\n  def up():\n    nonlocal n\n    n += 1\n    return n\n'
-        '  return up\none = make()\ntwo = make()',
-        *('one()', 'two()'),
-    ),
-    ('class D(dict):\n  def __init__(self): self.__dict__ = self', 'D().x = 1', 'D().x'),
-    # A copy.
-    ('S = {}\ndef get(): return dict(S)', 'g = get(); g[1] = 1', 'get()'),
-    # What processes share.
-    ('import redis\nR = redis.Redis()', "R.set('x', 1)", "R.get('x')"),
-    (
-        'from multiprocessing.shared_memory import SharedMemory\nM = SharedMemory("x")\n'
-        'def get(): return M',
-        *('get().buf[0] = 1', 'M.buf[0]'),
-    ),
-    # A call of a call of a call is left after some.
-    ('class B:\n  def a(self): return self\nb = B()', f'b{".a()" * 99}.x = 1', f'b{".a()" * 99}.x'),
 ]  # fmt: skip
 OWN = [
     # Nobody changes it.
@@ -222,33 +112,6 @@ def test_what_one_process_changes_another_one_cannot_read(find, code, name):
         f"'parts:read' in the process of the system reads '{name}' of the module '{home}', "
         "which only 'parts:write' in worker one changes"
     )
-
-
-@pytest.mark.parametrize(('code', 'write', 'read', 'name'), KEPT)
-def test_an_object_that_code_keeps_is_shared(find, code, write, read, name):
-    (message,) = find(f'{code}\ndef write(node): {write}\ndef read(node): return {read}')
-    assert f" reads '{name}' of the module 'parts', which only 'parts:write' " in message
-    both = f'{code}\ndef write(node): {write}\ndef read(node):\n  {write}\n  return {read}'
-    assert find(both) == []
-
-
-@pytest.mark.parametrize(('code', 'write', 'read'), UNSHARED)
-def test_what_nobody_else_changes_is_not_shared(find, code, write, read):
-    assert find(f'{code}\ndef write(node): {write}\ndef read(node): return {read}') == []
-
-
-def test_nodes_of_classes_that_keep_one_object_share_it(find):
-    code = f"""{WORLD}
-class Writer:
-    def __init__(self): self.world = World.get()
-    def write(self, node): self.world.add(1)
-class Reader:
-    def __init__(self): self.world = World.get()
-    def read(self, node): return self.world.count
-"""
-    nodes = NODES.replace('parts:write', 'parts:Writer.write')
-    (message,) = find(code, nodes.replace('parts:read', 'parts:Reader.read'))
-    assert "reads 'World._instance.people'" in message
 
 
 @pytest.mark.parametrize(('code', 'name'), SHARED)

@@ -1,1 +1,0 @@
-"""Infer what behaviours do with their nodes and messages, without running them."""

@@ -1,1 +1,0 @@
-"""Evaluate the classes of behaviours, and their objects."""

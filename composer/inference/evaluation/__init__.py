@@ -1,1 +1,0 @@
-"""Evaluate the expressions of behaviours, and follow their statements and calls."""

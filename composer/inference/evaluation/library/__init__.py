@@ -1,1 +1,0 @@
-"""What Python and its library make of values."""

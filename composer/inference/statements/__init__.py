@@ -1,1 +1,0 @@
-"""Follow the statements of behaviours: what they store, and on which conditions."""

@@ -1,0 +1,268 @@
+"""Read behaviours: each function once, for all nodes that it is bound to."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.entity_kinds import TRANSITION_BEHAVIOURS
+from composer.node_uses.names import Names, is_of_project, own_nodes
+from composer.node_uses.reading import Payload, Reading, missing_reading, unknown_reading
+from composer.node_uses.unread_code import Mentions, find_mentions
+from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
+from composer.node_uses.walk import Walk
+from composer.node_uses.wires import Wire, wire_of
+from composer.python_source.function_kinds import FunctionKind
+from composer.python_source.local_names import list_arguments
+from composer.python_source.modules import FunctionSource, ModuleSource
+from composer.python_source.places import span_of
+from composer.python_source.return_values import ends_without_value, never_returns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from composer.language.bindings import Binding
+    from composer.language.specs import EndSpec, NodeSpec
+    from composer.python_source.module_finder import ModuleFinder
+    from composer.yaml_text.positions import DataPath
+
+# That a call may raise is no way to end a loop.
+_WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
+# What the behaviours of these keys return: the types, and what to return instead.
+_TRANSITION: tuple[set[type], str] = ({bool, type(None)}, 'False if it failed, or nothing')
+_ANSWERS: dict[str, tuple[set[type], str]] = {
+    'accept': ({bool, str, type(None)}, 'whether to accept, or why not'),
+    'on_parameters': ({str, type(None)}, 'None, or why not'),
+}
+
+
+class BehaviourReader:
+    """Reads what behaviours do.
+
+    Args:
+        has_real_type: Whether the type of an entity is the one that is meant.
+    """
+
+    def __init__(self, modules: ModuleFinder, has_real_type: Callable[[EndSpec], bool]) -> None:
+        self._finder = modules
+        self._names = Names(modules)
+        self._has_real_type = has_real_type
+        self._read: dict[object, Reading] = {}
+        self._wires: dict[DataPath, Wire] = {}
+        self._mentions: dict[int, Mentions] = {}
+        self._followed: set[int] = set()
+
+    def read(self, node: NodeSpec, binding: Binding) -> Reading:
+        """Return what a behaviour does with its node."""
+        wire = self.wire_of(node, binding)
+        ends = (wire.needs_payload, wire.is_unpublished, binding.may_yield)
+        key = (binding.behaviour.name, binding.key, ends)
+        if key not in self._read:
+            self._read[key] = self._read_anew(binding, wire)
+        return self._read[key]
+
+    def wire_of(self, node: NodeSpec, binding: Binding) -> Wire:
+        """Return the types around a behaviour."""
+        place = binding.behaviour.path
+        if place not in self._wires:
+            self._wires[place] = wire_of(node, binding, self._has_real_type)
+        return self._wires[place]
+
+    def mentions(self, reading: Reading) -> Mentions:
+        """Return what the modules of a behaviour may use beside what was read of it."""
+        found = Mentions()
+        for key, module in reading.modules.items():
+            if key not in self._mentions:
+                self._mentions[key] = find_mentions(module, self._followed)
+            found.names |= self._mentions[key].names
+            found.open_kinds |= self._mentions[key].open_kinds
+            found.attributes |= self._mentions[key].attributes
+        return found
+
+    def _read_anew(self, binding: Binding, wire: Wire) -> Reading:
+        behaviour = binding.behaviour
+        module = self._finder.find(behaviour.module)
+        if not isinstance(module, ModuleSource):
+            return missing_reading()
+        if not is_of_project(module, behaviour.module, self._finder):
+            return unknown_reading()
+        self._names.find_module(behaviour.module)
+        function = self._function(module, binding)
+        if function is None:
+            top = self._names.top(module)
+            name = behaviour.class_name or behaviour.function
+            is_missing = not (name in top.statements or top.is_open or top.is_dynamic)
+            return missing_reading() if is_missing else unknown_reading()
+        walk = Walk(self._names, self._followed)
+        try:
+            given = self._given(function, binding)
+            walk.enter(function, given, is_waited=True)
+            _Results(walk, function, given, binding, wire).note()
+            if len(given) < len(binding.parameters):
+                walk.run.reading.open_all()
+        except RecursionError:
+            return unknown_reading()
+        return walk.run.reading
+
+    def _function(self, module: ModuleSource, binding: Binding) -> Function | None:
+        behaviour = binding.behaviour
+        if not behaviour.class_name:
+            value = self._names.top_value(module, behaviour.function)
+        else:
+            of = self._names.top_value(module, behaviour.class_name)
+            if not isinstance(of, Class) or of.definition.keywords:
+                return None
+            value = self._names.attribute(self._object_of(of), behaviour.method_name)
+        return value if isinstance(value, Function) else None
+
+    def _object_of(self, of: Class) -> Instance:
+        """Return the object that the node has of a class: it is made with the node."""
+        init = self._names.attribute(Instance(of), '__init__')
+        if not isinstance(init, Function):
+            return Instance(of)
+        parameters = [each.arg for each in list_arguments(init.definition.args)][1:]
+        return Instance(of, ((parameters[0], Chain(('node',))),)) if parameters else Instance(of)
+
+    def _given(self, function: Function, binding: Binding) -> dict[str, Value]:
+        arguments = function.definition.args
+        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        names = names[1:] if function.bound is not None else names
+        second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
+        values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
+        return dict(zip(names, values, strict=False))
+
+
+class _Results:
+    """Notes what a behaviour gives away, and whether it comes to an end."""
+
+    def __init__(
+        self,
+        walk: Walk,
+        function: Function,
+        given: dict[str, Value],
+        binding: Binding,
+        wire: Wire,
+    ) -> None:
+        self._walk = walk
+        self._run = walk.run
+        self._function = function
+        self._binding = binding
+        self._wire = wire
+        definition = function.definition
+        is_plain = not isinstance(definition, ast.Lambda)
+        self._kind = FunctionSource(definition).kind if is_plain else FunctionKind.PLAIN  # type: ignore[arg-type]
+        self._scope = Scope(function.module, definition, given)
+
+    def note(self) -> None:
+        """Note all of it."""
+        definition = self._function.definition
+        if isinstance(definition, ast.Lambda):
+            return
+        if self._function.bound is not None:
+            self._note_init(self._function.bound)
+        is_generator = self._kind is not None and self._kind.is_generator
+        for node in own_nodes(definition):
+            match node:
+                case ast.Return(value=ast.expr() as value):
+                    self._note_payload(value, 'returned')
+                    self._check_answer(value)
+                case ast.Yield(value=ast.expr() as value) if is_generator:
+                    self._note_payload(value, 'yielded')
+                case ast.While(test=test) if self._is_endless(node):
+                    text = (
+                        'this loop never ends, and nothing else of its callback group runs again'
+                    )
+                    help_text = 'let a timer call the behaviour'
+                    self._run.report('endless-loop', self._function.module, test, text, help_text)
+        is_last = self._kind is FunctionKind.ASYNC_GENERATOR
+        is_allowed = self._binding.may_yield or not is_generator
+        # The last one that an asynchronous generator yields is the result.
+        if self._wire.needs_payload and is_allowed and not is_last:
+            self._check_ways(definition)
+
+    def _note_init(self, bound: Value) -> None:
+        """Walk through the making of the object whose method the behaviour is."""
+        names = self._walk.run.names
+        init = names.attribute(bound, '__init__')
+        if isinstance(bound, Instance) and isinstance(init, Function):
+            self._walk.enter(init, dict(bound.given), is_waited=True)
+
+    def _note_payload(self, value: ast.expr, key: str) -> None:
+        module = self._function.module
+        is_none = isinstance(value, ast.Constant) and value.value is None
+        is_last = self._kind is FunctionKind.ASYNC_GENERATOR
+        if not is_none and not is_last:
+            self._run.reading.payloads.append(Payload('', key, '', value, module, True))
+            for node in value.values if isinstance(value, ast.Dict) else [value]:
+                if self._wire.returned or self._wire.yielded:
+                    self._walk.need(node, self._scope)
+        if self._wire.is_unpublished and _is_made_there(value):
+            self._run.reading.unpublished.append(span_of(module, value))
+
+    def _is_endless(self, loop: ast.While) -> bool:
+        """Return whether nothing else of the group runs once a loop has begun."""
+        kind = self._binding.kind
+        # Goals have threads of their own.
+        if self._kind is not FunctionKind.PLAIN or (kind is not None and kind.channel == 'action'):
+            return False
+        is_always_true = isinstance(loop.test, ast.Constant) and bool(loop.test.value)
+        return is_always_true and not any(isinstance(node, _WAYS_OUT) for node in own_nodes(loop))
+
+    def _check_answer(self, value: ast.expr) -> None:
+        """Check what `accept`, `on_parameters` and transitions return."""
+        key = self._binding.key.key
+        wanted, advice = _ANSWERS.get(key, _TRANSITION)
+        if key not in _ANSWERS and key not in TRANSITION_BEHAVIOURS:
+            return
+        kind = _type_of(value)
+        if kind is not None and kind not in wanted:
+            text = f'{self._binding.owner} returns a {kind.__name__}'
+            module = self._function.module
+            self._run.report('bad-answer', module, value, text, f'return {advice}')
+
+    def _check_ways(self, definition: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
+        """Check that all ways give the response or result that is waited for."""
+        if _is_stub(definition):
+            return
+        names, module = self._run.names, self._function.module
+
+        def is_last(call: ast.Call) -> bool:
+            called = names.value_of(call.func, self._scope)
+            last = called.definition if isinstance(called, Function) else None
+            return last is not None and not isinstance(last, ast.Lambda) and never_returns(last)
+
+        ends = ends_without_value(definition, is_last)
+        bare = next((end for end in ends if end is not definition), None)
+        if ends:
+            text = 'some ways through this function return nothing, and the caller gets an error'
+            help_text = 'return something at its end'
+            place = definition if bare is None or definition in ends else bare
+            self._run.report('missing-return', module, place, text, help_text)
+
+
+def _is_made_there(node: ast.expr) -> bool:
+    """Return whether an expression is a dictionary, or makes an object of a class."""
+    called = node.func if isinstance(node, ast.Call) else None
+    name = str(getattr(called, 'id', None) or getattr(called, 'attr', ''))
+    return isinstance(node, ast.Dict) or name[:1].isupper()
+
+
+def _is_stub(definition: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Return whether a function is still to be written: it has a docstring, `...` or `pass`."""
+    plain = (each.value if isinstance(each, ast.Expr) else each for each in definition.body)
+    return all(isinstance(each, ast.Constant | ast.Pass) for each in plain)
+
+
+def _type_of(value: ast.expr) -> type | None:
+    match value:
+        case ast.Constant(value=constant):
+            return type(constant)
+        case ast.Compare() | ast.UnaryOp(op=ast.Not()):
+            return bool
+        case ast.Dict():
+            return dict
+        case ast.List():
+            return list
+        case ast.JoinedStr():
+            return str
+    return None

@@ -1,0 +1,456 @@
+"""What names, attributes and calls stand for: each has one value, wherever it is assigned once."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import sys
+from typing import TYPE_CHECKING, TypeAlias, TypeGuard
+
+from composer.node_uses.values import (
+    Chain,
+    Class,
+    External,
+    Function,
+    Instance,
+    Made,
+    Module,
+    Scope,
+    Texts,
+    Value,
+)
+from composer.python_source.annotations import find_interface
+from composer.python_source.local_names import list_arguments, nested_names, stored_names
+from composer.python_source.modules import MOST_BASES, ModuleSource
+from composer.python_source.syntax import FunctionNode, list_children
+from composer.python_source.top_names import TopNames
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from composer.python_source.module_finder import ModuleFinder
+
+# The classes whose objects threads wait for, by the name of the class that waits alike.
+MADE = {
+    'threading.BoundedSemaphore': 'threading.Semaphore',
+    **{
+        name: name
+        for name in (
+            *(f'threading.{each}' for each in ('Barrier', 'Condition', 'Event', 'Lock')),
+            *('threading.Semaphore', 'threading.Thread', 'concurrent.futures.Future'),
+            *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
+        )
+    },
+}
+_INSTALLED = {'site-packages', 'dist-packages'}
+_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+# An expression that is assigned to a name, or whose items are; `None` for what is not shown.
+_Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
+# Longer ways from a name to its value are not followed.
+_MOST_STEPS = 25
+
+
+def own_nodes(definition: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a function, and not those of functions and classes in it."""
+    body = getattr(definition, 'body', [])
+    pending: list[ast.AST] = list(body) if isinstance(body, list) else [body]
+    while pending:
+        node = pending.pop()
+        yield node
+        if not isinstance(node, _SCOPES):
+            pending += list_children(node)
+
+
+def is_of_project(module: ModuleSource, name: str, finder: ModuleFinder) -> bool:
+    """Return whether a module is neither installed, but with the system, nor of Python itself."""
+    if module.path is None or not module.body:
+        return False
+    if finder.is_of_ros_package(name):
+        return True
+    parts = set(module.path.parts)
+    return not (parts & _INSTALLED) and not module.path.is_relative_to(sys.base_prefix)
+
+
+class Names:
+    """Finds what the expressions of a project stand for."""
+
+    def __init__(self, finder: ModuleFinder) -> None:
+        self._finder = finder
+        self._module_names: dict[int, str] = {}
+        self._tops: dict[int, TopNames] = {}
+        self._stored: dict[int, dict[str, list[_Stored]]] = {}
+        self._steps = 0
+
+    def top(self, module: ModuleSource) -> TopNames:
+        """Return the names at the top of a module."""
+        if id(module) not in self._tops:
+            self._tops[id(module)] = TopNames(module.body)
+        return self._tops[id(module)]
+
+    def find_module(self, name: str) -> ModuleSource | None:
+        """Return a module of the project, if it is one and can be read."""
+        top_level = name.partition('.')[0]
+        if not name or top_level in sys.stdlib_module_names or top_level in ('rclpy', 'composer'):
+            return None
+        module = self._finder.find(name)
+        if not isinstance(module, ModuleSource) or not is_of_project(module, name, self._finder):
+            return None
+        self._module_names.setdefault(id(module), name)
+        return module
+
+    def name_of(self, module: ModuleSource) -> str:
+        """Return the name of a module that was found."""
+        return self._module_names.get(id(module), '')
+
+    def module_of(self, node: ast.expr, scope: Scope) -> ModuleSource | None:
+        """Return the module of the project that an expression is."""
+        value = self.value_of(node, scope)
+        return value.source if isinstance(value, Module) else None
+
+    def origin_of(self, module: ModuleSource, name: str) -> tuple[ModuleSource | None, str]:
+        """Return the module of the project that stores a name which this one has or imports."""
+        for _ in range(_MOST_STEPS):
+            statements = self.top(module).statements.get(name, [])
+            if not statements or not isinstance(statements[0][0], ast.Import | ast.ImportFrom):
+                return (module, name) if statements else (None, name)
+            home, _, name = self._full_name(module, statements[0][0], name).rpartition('.')
+            found = self.find_module(home)
+            if found is None:
+                break
+            module = found
+        return None, name
+
+    def alias_of(self, name: str, scope: Scope) -> ast.AST | None:
+        """Return what a function assigns to a name, where it does once."""
+        stored = self.stored_in(scope.definition).get(name, []) if scope.definition else []
+        return stored[0][0] if len(stored) == 1 and not stored[0][1] else None
+
+    def is_local(self, name: str, scope: Scope) -> bool:
+        """Return whether a name is one of a function."""
+        definition = scope.definition
+        if definition is None:
+            return False
+        arguments = {each.arg for each in list_arguments(definition.args)}
+        return name in arguments or name in self.stored_in(definition)
+
+    # Expressions
+
+    def value_of(self, node: ast.expr, scope: Scope) -> Value | None:
+        """Return what an expression stands for, `None` if that is not known."""
+        if self._steps > _MOST_STEPS:
+            return None
+        self._steps += 1
+        try:
+            return self._value_of(node, scope)
+        finally:
+            self._steps -= 1
+
+    def _value_of(self, node: ast.expr, scope: Scope) -> Value | None:
+        match node:
+            case ast.Name(id=name):
+                return self.named(name, scope)
+            case ast.Constant(value=str(text)):
+                return Texts(((text, node, scope.module),))
+            case ast.IfExp(body=body, orelse=other):
+                return _either(self.value_of(body, scope), self.value_of(other, scope))
+            case ast.Attribute(value=inner, attr=name):
+                owner = self.value_of(inner, scope)
+                return None if owner is None else self.attribute(owner, name)
+            case ast.Subscript(value=inner, slice=index):
+                return _item_of(self.value_of(inner, scope), index)
+            case ast.Call():
+                return self._result_of(node, scope)
+        return None
+
+    def named(self, name: str, scope: Scope) -> Value | None:
+        """Return what a name stands for in a scope."""
+        within: Scope | None = scope
+        while within is not None and within.definition is not None:
+            stored = self.stored_in(within.definition).get(name)
+            if stored is not None:
+                return self._stored_value(stored, within)
+            if name in within.given:
+                return within.given[name]
+            if name in {each.arg for each in list_arguments(within.definition.args)}:
+                return None
+            within = within.outer
+        return self.top_value(scope.module, name)
+
+    def stored_in(self, definition: ast.AST) -> dict[str, list[_Stored]]:
+        """Return the names that a function stores, and what it assigns to each."""
+        if id(definition) not in self._stored:
+            self._stored[id(definition)] = _find_stored(definition)
+        return self._stored[id(definition)]
+
+    def _stored_value(self, stored: list[_Stored], scope: Scope) -> Value | None:
+        expression, is_item = stored[0]
+        if len(stored) > 1 or expression is None:
+            return None
+        if isinstance(expression, _FUNCTIONS):
+            is_plain = not expression.decorator_list
+            return Function(scope.module, expression, None, scope) if is_plain else None
+        if not is_item:
+            return self.value_of(expression, scope)
+        if isinstance(expression, ast.Tuple | ast.List):
+            found: Value | None = None
+            for position, each in enumerate(expression.elts):
+                value = self.value_of(each, scope)
+                found = _either(found, value) if position else value
+            return found
+        value = self.value_of(expression, scope)
+        return Chain((*value.path, '[]')) if _is_of_message(value) else None
+
+    def top_value(self, module: ModuleSource, name: str) -> Value | None:
+        """Return what a name at the top of a module stands for."""
+        top = self.top(module)
+        statements = top.statements.get(name, [])
+        if not statements:
+            is_builtin = not top.is_open and hasattr(builtins, name)
+            return External(f'builtins.{name}') if is_builtin else None
+        statement, is_conditional = statements[0]
+        is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+        if name in top.stored_again and not isinstance(statement, ast.Assign):
+            return None
+        if (len(statements) > 1 or is_conditional) and not is_import:
+            return None
+        return self._top_value(module, statement, name)
+
+    def _top_value(self, module: ModuleSource, statement: ast.AST, name: str) -> Value | None:
+        match statement:
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                return None if statement.decorator_list else Function(module, statement)
+            case ast.ClassDef():
+                return Class(module, statement)
+            case ast.Import() | ast.ImportFrom():
+                return self._imported(self._full_name(module, statement, name))
+        for target, value, is_item in _assignments(statement):
+            is_changed = name in self.top(module).stored_again and isinstance(value, ast.Constant)
+            if isinstance(target, ast.Name) and target.id == name and not is_item:
+                return None if is_changed else self.value_of(value, Scope(module))
+        return None
+
+    def _full_name(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
+        """Return the full name of what an import stores under a name; empty if unknown."""
+        if isinstance(statement, ast.Import):
+            full = (alias.name for alias in statement.names if alias.asname == name)
+            return next(full, name)
+        home = getattr(statement, 'module', '') or ''
+        level: int = getattr(statement, 'level', 0)
+        if level:
+            base = self._module_names.get(id(module), '').split('.')
+            is_package = module.path is not None and module.path.name == '__init__.py'
+            kept = base[: len(base) - level + is_package]
+            home = '.'.join([*kept, *filter(None, [home])])
+        for alias in getattr(statement, 'names', ()):
+            if home and (alias.asname or alias.name) == name:
+                return f'{home}.{alias.name}'
+        return ''
+
+    def _imported(self, full_name: str) -> Value | None:
+        if not full_name:
+            return None
+        module = self.find_module(full_name)
+        if module is not None:
+            return Module(module)
+        home, _, name = full_name.rpartition('.')
+        module = self.find_module(home)
+        return External(full_name) if module is None else self.top_value(module, name)
+
+    # Attributes
+
+    def attribute(self, owner: Value, name: str) -> Value | None:
+        """Return what an attribute stands for."""
+        match owner:
+            case Chain():
+                return Chain((*owner.path, name))
+            case External():
+                return External(f'{owner.name}.{name}')
+            case Module():
+                own = self.top_value(owner.source, name)
+                inner = f'{self._module_names.get(id(owner.source), "")}.{name}'
+                return own or self._imported(inner)
+            case Instance():
+                return self._attribute_of(owner.of, name, owner)
+            case Class():
+                return self._attribute_of(owner, name, None)
+        return None
+
+    def _attribute_of(self, of: Class, name: str, instance: Instance | None) -> Value | None:
+        for each in self.bases_of(of):
+            stored: list[tuple[FunctionNode, ast.expr | None]] = []
+            for statement in each.definition.body:
+                match statement:
+                    case ast.FunctionDef(name=str(own)) | ast.AsyncFunctionDef(name=str(own)):
+                        if own == name:
+                            return _method(each, statement, instance)
+                        stored += _stores_of(statement, name)
+                    case ast.Assign(targets=[ast.Name(id=own)], value=value) if own == name:
+                        is_none = _is_none(value) or self._is_stored(each.module, name)
+                        if not is_none:
+                            return self.value_of(value, Scope(each.module))
+            stored = [(method, value) for method, value in stored if not _is_none(value)]
+            if stored and instance is not None:
+                method, kept = stored[0]
+                if len(stored) > 1 or kept is None or self._is_stored(each.module, name, 1):
+                    return None
+                given: dict[str, Value] = dict(instance.given) if method.name == '__init__' else {}
+                own_name = next(list_arguments(method.args), None)
+                given |= {own_name.arg: instance} if own_name else {}
+                return self.value_of(kept, Scope(each.module, method, given))
+        return None
+
+    def _is_stored(self, module: ModuleSource, name: str, times: int = 0) -> bool:
+        """Return whether code may store an attribute more often than that."""
+        stored = self.top(module).stored_attributes
+        return stored[''] > 0 or stored[name] > times
+
+    def bases_of(self, of: Class) -> Iterator[Class]:
+        """Yield a class, and those of the project that it inherits from."""
+        pending = [of]
+        for _ in range(MOST_BASES):
+            if not pending:
+                return
+            each = pending.pop(0)
+            yield each
+            for base in each.definition.bases:
+                value = self.value_of(base, Scope(each.module))
+                pending += [value] if isinstance(value, Class) else []
+
+    def instance_of(self, of: Class, call: ast.Call | None, scope: Scope) -> Instance:
+        """Return an object of a class that a call makes."""
+        init = self._attribute_of(of, '__init__', Instance(of))
+        if not isinstance(init, Function) or call is None:
+            return Instance(of)
+        return Instance(of, tuple(self.bind(init, call, scope).items()))
+
+    def bind(self, function: Function, call: ast.Call, scope: Scope) -> dict[str, Value]:
+        """Return what the parameters of a function stand for in a call, without its `self`."""
+        arguments = function.definition.args
+        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        names = names[1:] if function.bound is not None else names
+        pairs: list[tuple[str, ast.expr]] = []
+        for name, value in zip(names, call.args, strict=False):
+            if isinstance(value, ast.Starred):
+                break
+            pairs.append((name, value))
+        pairs += [(each.arg, each.value) for each in call.keywords if each.arg]
+        values = ((name, self.value_of(node, scope)) for name, node in pairs)
+        return {name: value for name, value in values if value is not None}
+
+    def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
+        match self.value_of(call.func, scope):
+            case External(name=name) if name in MADE:
+                return Made(MADE[name], scope.module, call)
+            case External(name=name) if (interface := find_interface(name)) is not None:
+                return Chain(('made', interface))
+            case Class() as of:
+                return self.instance_of(of, call, scope)
+            case Chain(path=('node', 'send_goal')):
+                sent = self.value_of(call.args[0], scope) if call.args else None
+                if isinstance(sent, Texts) and len(sent.options) == 1:
+                    return Chain(('goal', sent.options[0][0]))
+            case Chain(path=('node', 'with_own_state')):
+                return Chain(('node',))
+        return None
+
+
+def _find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
+    nodes = list(own_nodes(definition))
+    found: dict[str, list[_Stored]] = {}
+    shown: set[int] = set()
+    shared = {
+        name
+        for node in nodes
+        if isinstance(node, ast.Global | ast.Nonlocal)
+        for name in node.names
+    }
+    for node in nodes:
+        for target, value, is_item in _assignments(node):
+            if isinstance(target, ast.Name):
+                shown.add(id(target))
+                found.setdefault(target.id, []).append((value, is_item))
+    for stored in stored_names(nodes):
+        if id(stored) not in shown:
+            found.setdefault(stored.id, []).append((None, False))
+    functions = {node.name: node for node in nodes if isinstance(node, _FUNCTIONS)}
+    for name, function in functions.items():
+        found.setdefault(name, []).append((function, False))
+    for each in (nested_names(nodes) - functions.keys()) | _patterns(nodes):
+        found.setdefault(each, []).append((None, False))
+    return {name: several for name, several in found.items() if name not in shared}
+
+
+def _assignments(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
+    """Yield targets with what is assigned to them, and whether that is one of its items."""
+    match node:
+        case ast.Assign(targets=targets, value=value):
+            for target in targets:
+                if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+                    pairs = zip(target.elts, value.elts, strict=False)
+                    yield from ((one, other, False) for one, other in pairs)
+                else:
+                    yield target, value, False
+        case (
+            ast.AnnAssign(target=target, value=ast.expr() as value)
+            | ast.NamedExpr(target=target, value=value)
+        ):
+            yield target, value, False
+        case ast.For(target=target, iter=value) | ast.comprehension(target=target, iter=value):
+            yield target, value, True
+
+
+def _patterns(nodes: list[ast.AST]) -> set[str]:
+    """Return the names that patterns store."""
+    found = {
+        node.name
+        for node in nodes
+        if isinstance(node, ast.MatchAs | ast.MatchStar) and node.name is not None
+    }
+    return found | {
+        node.rest for node in nodes if isinstance(node, ast.MatchMapping) and node.rest
+    }
+
+
+def _stores_of(method: FunctionNode, name: str) -> Iterator[tuple[FunctionNode, ast.expr | None]]:
+    """Yield what a method stores in an attribute of its object."""
+    own_name = next(list_arguments(method.args), None)
+    for node in own_nodes(method):
+        for target, value, _ in _assignments(node):
+            match target:
+                case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
+                    if own_name and owner == own_name.arg and attribute == name:
+                        yield method, value
+
+
+def _method(of: Class, method: FunctionNode, instance: Instance | None) -> Function | None:
+    decorators = [ast.unparse(each) for each in method.decorator_list]
+    if decorators == ['staticmethod']:
+        return Function(of.module, method)
+    if decorators == ['classmethod']:
+        return Function(of.module, method, of)
+    return None if decorators else Function(of.module, method, instance)
+
+
+def _either(one: Value | None, other: Value | None) -> Value | None:
+    if isinstance(one, Texts) and isinstance(other, Texts):
+        return Texts((*one.options, *other.options))
+    return one if one == other else None
+
+
+def _item_of(owner: Value | None, index: ast.expr) -> Value | None:
+    """Return an item of something in a message."""
+    if not _is_of_message(owner):
+        return None
+    match index:
+        case ast.Constant(value=int(number)):
+            return Chain((*owner.path, f'[{number}]'))
+    return None if isinstance(index, ast.Slice) else Chain((*owner.path, '[]'))
+
+
+def _is_of_message(value: Value | None) -> TypeGuard[Chain]:
+    return isinstance(value, Chain) and value.path[0] in ('message', 'made')
+
+
+def _is_none(value: ast.expr | None) -> bool:
+    return isinstance(value, ast.Constant) and value.value is None

@@ -1,0 +1,213 @@
+"""Calls of the node: what is sent, created and asked for, by which names."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from typing import TYPE_CHECKING
+
+from composer.entity_kinds import KIND_OF_NOUN
+from composer.node_uses.literals import NotLiteralError, literal_of
+from composer.node_uses.reading import (
+    CREATING_METHODS,
+    SENDING_METHODS,
+    CreatedEntity,
+    Payload,
+    RemoteParameter,
+)
+from composer.node_uses.values import Chain, External, Function, Texts
+from composer.python_source.modules import read_signature
+from composer.python_source.places import span_of
+from composer.schema.structure import find_problem
+
+if TYPE_CHECKING:
+    import inspect
+    from collections.abc import Iterator, Mapping
+
+    from composer.node_uses.current_run import Run
+    from composer.node_uses.reading import Waited
+    from composer.node_uses.values import Scope, Value
+
+# A test holds these against `composer.Node`.
+_SIGNATURES = {
+    'call': 'name, payload=None, timeout=5.0',
+    'call_async': 'name, payload=None, timeout=5.0',
+    'create_client': 'srv_type, srv_name, **options',
+    'create_publisher': 'msg_type, topic, qos=None, **options',
+    'create_service': 'srv_type, srv_name, behaviour, **options',
+    'create_subscription': 'msg_type, topic, behaviour, qos=None, **options',
+    'create_timer': 'period, behaviour, **options',
+    'destroy': 'entity',
+    'get_parameters': 'node_name, names, timeout=5.0',
+    'now': '',
+    'publish': 'name, payload',
+    'send_goal': 'name, payload=None, timeout=5.0',
+    'set_parameters': 'node_name, values, timeout=5.0',
+    'shutdown': 'code=0',
+    'sleep': 'seconds',
+    'with_own_state': '',
+}
+NODE_METHODS = frozenset(_SIGNATURES)
+_PARTS = {'publish': '', 'call': '_Request', 'call_async': '_Request', 'send_goal': '_Goal'}
+
+
+@cache
+def signature_of(method: str) -> inspect.Signature:
+    """Return how a method of the node is called."""
+    (function,) = ast.parse(f'def {method}({_SIGNATURES[method]}): pass').body
+    assert isinstance(function, ast.FunctionDef)  # noqa: S101 (a line of the table above)
+    return read_signature(function.args)
+
+
+def explain_misfit(signature: inspect.Signature, call: ast.Call) -> str | None:
+    """Return why a function cannot be called so, `None` if it can."""
+    if _is_open(call):
+        return None
+    try:
+        signature.bind(*call.args, **{each.arg or '': each.value for each in call.keywords})
+    except TypeError as error:
+        return str(error)
+    return None
+
+
+def note_call(
+    run: Run, method: str, call: ast.Call, scope: Scope, *, is_awaited: bool
+) -> Iterator[tuple[Function, list[Value | None]]]:
+    """Note what a call of the node does; yield the behaviours that it creates."""
+    signature = signature_of(method)
+    misfit = explain_misfit(signature, call)
+    if misfit is not None:
+        shown = str(signature).replace('=Ellipsis', '=…')
+        text = f'{method}{shown} is called with other arguments: {misfit}'
+        run.report('bad-call', scope.module, call, text, None)
+        if method in CREATING_METHODS:
+            return
+    if misfit is not None or _is_open(call):
+        run.escape(Chain(('node', method)))
+        return
+    keywords = {each.arg or '': each.value for each in call.keywords}
+    bound = dict(signature.bind(*call.args, **keywords).arguments)
+    arguments: dict[str, ast.expr] = {**bound.pop('options', {}), **bound}
+    if method in SENDING_METHODS:
+        _note_sent(run, method, arguments, scope, is_awaited=is_awaited)
+    elif method in CREATING_METHODS:
+        yield from _note_created(run, method, arguments, scope)
+    elif method in ('get_parameters', 'set_parameters'):
+        run.reading.reads_others |= method == 'get_parameters'
+        _note_remote(run, arguments, scope)
+
+
+def _is_open(call: ast.Call) -> bool:
+    is_starred = any(isinstance(each, ast.Starred) for each in call.args)
+    return is_starred or any(each.arg is None for each in call.keywords)
+
+
+def _note_sent(
+    run: Run, method: str, arguments: Mapping[str, ast.expr], scope: Scope, *, is_awaited: bool
+) -> None:
+    kind = SENDING_METHODS[method]
+    name = run.names.value_of(arguments['name'], scope)
+    is_wait = method in ('call', 'send_goal') or (method == 'call_async' and is_awaited)
+    waits: Waited = 'answer' if is_wait and scope.waits and not run.doubts else ''
+    run.use(kind, name, waits=waits)
+    payload = arguments.get('payload')
+    is_none = isinstance(payload, ast.Constant) and payload.value is None
+    is_known = isinstance(name, Texts) and len(name.options) == 1 and not (run.guards or run.fixed)
+    if payload is not None and is_known and not (is_none and method != 'publish'):
+        section, text = KIND_OF_NOUN[kind].section, name.options[0][0]  # type: ignore[union-attr]
+        part, is_certain = _PARTS[method], run.is_certain
+        sent = Payload(section, text, part, payload, scope.module, is_certain)
+        run.reading.payloads.append(sent)
+
+
+def note_goal(run: Run, chain: Chain, call: ast.Call, scope: Scope, *, is_awaited: bool) -> None:
+    """Note that a behaviour waits for the end of a goal."""
+    match chain.path:
+        case ('goal', name, 'result' | 'result_async' as method):
+            if scope.waits and not run.doubts and (method == 'result' or is_awaited):
+                named = Texts(((name, call, scope.module),))
+                run.use('action client', named, waits='end')
+
+
+def _note_created(
+    run: Run, method: str, arguments: Mapping[str, ast.expr], scope: Scope
+) -> Iterator[tuple[Function, list[Value | None]]]:
+    noun, _ = CREATING_METHODS[method]
+    of_type = arguments.get('msg_type') or arguments.get('srv_type')
+    channel = arguments.get('topic') or arguments.get('srv_name')
+    _check_options(run, noun, arguments, scope)
+    if of_type is not None and channel is not None:
+        type_name = _type_named(run, of_type, scope)
+        place = span_of(scope.module, of_type)
+        text = _only_text(run.names.value_of(channel, scope))
+        name = _only_text(run.names.value_of(arguments.get('name', channel), scope))
+        run.reading.created.append(CreatedEntity(noun, name, text, type_name, place))
+    if 'publish' in arguments:
+        run.use('publisher', run.names.value_of(arguments['publish'], scope))
+    behaviour = arguments.get('behaviour')
+    function = run.names.value_of(behaviour, scope) if behaviour is not None else None
+    if isinstance(function, Function):
+        yield function, [Chain(('node',))]
+    elif behaviour is not None:
+        run.escape(Chain(('node',)))
+
+
+def _check_options(run: Run, noun: str, arguments: Mapping[str, ast.expr], scope: Scope) -> None:
+    """Check the keys that an entity is created with: they are those of the file."""
+    kind = KIND_OF_NOUN[noun]
+    own = ('name', 'msg_type', 'srv_type', 'srv_name')
+    for name, node in arguments.items():
+        if name in own:
+            continue
+        try:
+            value = literal_of(node)
+        except NotLiteralError:
+            value = None
+        entity = {**kind.stand_in, name: value}
+        problem = find_problem({'nodes': {'node': {kind.section: {'created': entity}}}})
+        if problem and (value is not None or problem.startswith('unknown key')):
+            text = problem.replace("'created'", f"'{noun}'")
+            run.report('bad-call', scope.module, node, text, None)
+
+
+def _type_named(run: Run, node: ast.expr, scope: Scope) -> str | None:
+    """Return the full name of the interface type that an expression is, if that is known."""
+    value = run.names.value_of(node, scope)
+    if isinstance(value, External):
+        parts = value.name.split('.')
+        return '/'.join(parts) if parts[-2:-1] and parts[-2] in ('msg', 'srv', 'action') else None
+    return _only_text(value)
+
+
+def _only_text(value: Value | None) -> str | None:
+    is_one = isinstance(value, Texts) and len(value.options) == 1
+    return value.options[0][0] if is_one else None  # type: ignore[union-attr]
+
+
+def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> None:
+    """Note parameters of another node, if the code names both."""
+    target = run.names.value_of(arguments['node_name'], scope)
+    given = arguments.get('values') or arguments.get('names')
+    if not isinstance(target, Texts) or len(target.options) > 1:
+        return
+    text, node, module = target.options[0]
+    pairs: list[tuple[ast.expr | None, ast.expr]] = []
+    if isinstance(given, ast.Dict):
+        pairs = list(zip(given.keys, given.values, strict=True))
+    elif isinstance(given, ast.List | ast.Tuple):
+        pairs = [(each, each) for each in given.elts]
+    for key, value in pairs:
+        if isinstance(key, ast.Constant) and isinstance(key.value, str):
+            try:
+                known = literal_of(value) if value is not key else None
+            except NotLiteralError:
+                known = None
+            remote = RemoteParameter(
+                text,
+                span_of(module, node, text),
+                key.value,
+                span_of(scope.module, key, key.value),
+                known,
+                span_of(scope.module, value),
+            )
+            run.reading.remote_parameters.append(remote)

@@ -1,0 +1,272 @@
+"""What a behaviour uses of its node, and what is wrong in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from composer.entity_kinds import USED_KINDS
+from composer.records import record
+
+if TYPE_CHECKING:
+    import ast
+
+    from composer.diagnostics import Span
+    from composer.python_source.modules import ModuleSource
+
+# What a behaviour waits for when it uses an entity.
+Waited: TypeAlias = Literal['', 'answer', 'end']
+# The nouns of the kinds of entity that behaviours use by name, as in `service client`.
+USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
+# The methods of the node that create an entity, the noun of its kind, and the position of its
+# behaviour, if it has one.
+CREATING_METHODS = {
+    'create_publisher': ('publisher', None),
+    'create_subscription': ('subscription', 2),
+    'create_timer': ('timer', 1),
+    'create_service': ('service', 2),
+    'create_client': ('service client', None),
+}
+# The methods of the node that send something, and the noun of what they use by its name.
+SENDING_METHODS = {
+    'publish': 'publisher',
+    'call': 'service client',
+    'call_async': 'service client',
+    'send_goal': 'action client',
+}
+
+
+@record
+class NodeUse:
+    """A use of an entity of the node by its name, as in `node.publish('status', …)`.
+
+    Attributes:
+        kind: The noun of the entity's kind.
+        place: Where the name is written.
+        is_optional: Whether the behaviour works without it: `node.parameters.get('x')`.
+        has_default: Whether the behaviour has a value to use without it.
+        is_certain: Whether it happens whatever else the file says: it does not depend on
+            parameters, the node's name, or arguments under `with:`.
+        is_guarded: Whether the behaviour catches the error that it raises.
+        waits: What the behaviour itself waits for, whatever else the file says: the answer, or
+            the end of the goal.
+        is_change: Whether it is looked for among the changes of `on_parameters`.
+    """
+
+    kind: str
+    name: str
+    place: Span
+    is_optional: bool = False
+    has_default: bool = False
+    is_certain: bool = True
+    is_guarded: bool = False
+    waits: Waited = ''
+    is_change: bool = False
+
+
+@record
+class CreatedEntity:
+    """An entity that a behaviour creates: `node.create_publisher(…)`.
+
+    Attributes:
+        kind: The noun of its kind.
+        name: The name by which behaviours use it; `None` for one that is not known.
+        channel: The name of its topic or service, as it is given; `None` for any.
+        type: The full name of its type; `None` for any.
+        type_place: Where the type is written.
+    """
+
+    kind: str
+    name: str | None
+    channel: str | None
+    type: str | None
+    type_place: Span | None
+
+
+@record
+class Problem:
+    """Something wrong in a behaviour, whatever its node declares.
+
+    Attributes:
+        rule: The name of the rule that it breaks.
+        place: Where it is written.
+    """
+
+    rule: str
+    message: str
+    place: Span
+    help: str | None = None
+
+
+@record
+class StateUse:
+    """A name of `node.state` or `node.own_state` that is read.
+
+    Attributes:
+        is_guarded: Whether the behaviour does something about one that is not there.
+    """
+
+    name: str
+    place: Span
+    is_guarded: bool = False
+
+
+@record
+class RemoteParameter:
+    """A parameter that `node.set_parameters` or `node.get_parameters` names.
+
+    Attributes:
+        node: The name of its node; `node_place` is where it is written.
+        value: What it is set to, if the code shows it; else `None`.
+    """
+
+    node: str
+    node_place: Span
+    name: str
+    place: Span
+    value: object
+    value_place: Span
+
+
+@record
+class Awaited:
+    """What threads wait for: an object that a module or class makes, or a name of the state.
+
+    Attributes:
+        kind: The class of the object, as in `threading.Event`; empty for a name itself.
+        owner: The file and the place of the object; `state` for a name of the state.
+        name: The name by which it is shown.
+        made_at: Where the object is made.
+    """
+
+    kind: str
+    owner: str
+    name: str
+    made_at: Span | None = field(default=None, compare=False)
+
+
+@record
+class Block:
+    """A wait for something that another behaviour has to bring about, without an end.
+
+    Attributes:
+        called_at: Where the behaviour calls what waits, if it does not wait itself.
+    """
+
+    what: Awaited
+    place: Span
+    called_at: Span | None = None
+
+
+@record
+class Payload:
+    """A payload in the code.
+
+    Attributes:
+        section: The section of the entity that sends it; empty for one that the behaviour yields
+            or returns.
+        name: The name of this entity; or `yielded` or `returned`.
+        part: The part of the type that it becomes, as in `_Request`.
+        is_certain: As of a `NodeUse`.
+    """
+
+    section: str
+    name: str
+    part: str
+    value: ast.expr
+    module: ModuleSource
+    is_certain: bool
+
+
+@record
+class MessageUse:
+    """An attribute or item of the message that a behaviour is given.
+
+    Attributes:
+        path: The names and indices that lead to it: `('poses', '[0]', 'position')`.
+        of_type: The type of a message that the code makes; `None` for the one that is given.
+        is_write: Whether it is written to.
+        compared: The comparison with a constant that it is a part of.
+        is_certain: Whether the file does not decide on it.
+    """
+
+    path: tuple[str, ...]
+    node: ast.expr
+    module: ModuleSource
+    is_write: bool = False
+    compared: ast.Compare | None = None
+    is_certain: bool = True
+    of_type: str | None = None
+
+
+@dataclass(slots=True)
+class Reading:
+    """All that is known of what a behaviour does.
+
+    Attributes:
+        uses: What it uses of its node.
+        problems: What is wrong in it.
+        open_kinds: The kinds of which it may use more.
+        reads_others: Whether it may read parameters of other nodes.
+        reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
+        state_read: What it reads of `node.state`.
+        state_set: The names that it sets there.
+        is_state_open: Whether it may set others.
+        state_tested: The names that it asks for with `hasattr`.
+        own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
+            are as those of `state`.
+        modules: The modules that it needs.
+        unpublished: Where it gives away payloads that nothing publishes.
+        remote_parameters: Parameters of nodes that it sets or reads by their names.
+        blocks: What it waits for without an end.
+        fills: What it brings about that others may wait for, and whether it does so itself: what
+            it starts may do so, too.
+        asked: What it asks first, as in `queue.empty()`.
+        sleeps: How long it sleeps, in seconds, and where.
+        created: The entities that it creates.
+        payloads: What it sends, yields and returns, as it is written.
+        message_uses: What it reads and writes of the message.
+        values_needed: The parameters that have to have a value, and where.
+    """
+
+    uses: list[NodeUse] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
+    open_kinds: set[str] = field(default_factory=set)
+    reads_others: bool = False
+    reaches_ros: bool = False
+    state_read: list[StateUse] = field(default_factory=list)
+    state_set: set[str] = field(default_factory=set)
+    is_state_open: bool = False
+    state_tested: set[str] = field(default_factory=set)
+    own_state_read: list[StateUse] = field(default_factory=list)
+    own_state_set: set[str] = field(default_factory=set)
+    is_own_state_open: bool = False
+    modules: dict[int, ModuleSource] = field(default_factory=dict)
+    unpublished: list[Span] = field(default_factory=list)
+    remote_parameters: list[RemoteParameter] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)
+    fills: dict[Awaited, set[bool]] = field(default_factory=dict)
+    asked: set[Awaited] = field(default_factory=set)
+    sleeps: list[tuple[float, Span]] = field(default_factory=list)
+    created: list[CreatedEntity] = field(default_factory=list)
+    payloads: list[Payload] = field(default_factory=list)
+    message_uses: list[MessageUse] = field(default_factory=list)
+    values_needed: list[tuple[str, Span]] = field(default_factory=list)
+
+    def open_all(self) -> None:
+        """Note that the node was given to something unknown."""
+        self.open_kinds |= USED_NOUNS
+        self.reads_others = self.reaches_ros = self.is_state_open = True
+        self.is_own_state_open = True
+
+
+def unknown_reading() -> Reading:
+    """Return the reading of a behaviour whose source is not known."""
+    reading = Reading()
+    reading.open_all()
+    return reading
+
+
+def missing_reading() -> Reading:
+    """Return the reading of a behaviour that does not exist, which another check reports."""
+    return Reading(open_kinds=set(USED_NOUNS), is_state_open=True, is_own_state_open=True)

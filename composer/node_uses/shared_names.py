@@ -1,0 +1,171 @@
+"""Which objects of modules a behaviour reads, and which it changes.
+
+Names at the top of a module, and attributes of its classes, are what behaviours of several nodes
+share as long as these run in one process. Functions that a behaviour calls, or hands on, count as
+its own.
+"""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+from composer.node_uses.names import Names
+from composer.node_uses.values import Class, External, Function, Instance, Made, Scope
+from composer.node_uses.waiting import FILLING
+from composer.python_source.modules import MOST_BASES
+from composer.python_source.places import span_of
+from composer.python_source.syntax import list_nodes
+
+if TYPE_CHECKING:
+    from composer.diagnostics import Span
+    from composer.python_source.module_finder import ModuleFinder
+    from composer.python_source.modules import ModuleSource
+
+# A module, and a name in it, as in `Robot.pose`.
+SharedName: TypeAlias = tuple[str, str]
+# A behaviour that calls more is too large to follow.
+_MOST_FUNCTIONS = 200
+# Methods of containers that change them.
+_CHANGING = frozenset(
+    {
+        *('add', 'append', 'appendleft', 'clear', 'discard', 'extend', 'insert', 'pop', 'popitem'),
+        *('popleft', 'remove', 'reverse', 'setdefault', 'sort', 'update'),
+    }
+)
+
+
+@dataclass(slots=True)
+class NameUses:
+    """What behaviours do with objects: where first, for each."""
+
+    read: dict[SharedName, Span] = field(default_factory=dict)
+    changed: dict[SharedName, Span] = field(default_factory=dict)
+
+
+class SharedNames:
+    """Reads what behaviours do with objects of modules."""
+
+    def __init__(self, finder: ModuleFinder) -> None:
+        self._names = Names(finder)
+        self._found: dict[tuple[str, str], NameUses] = {}
+
+    def uses_of(self, module: str, function: str) -> NameUses:
+        """Return what a function, or `Class.method`, reads and changes."""
+        key = (module, function)
+        if key not in self._found:
+            self._found[key] = self._follow(module, function)
+        return self._found[key]
+
+    def _follow(self, name: str, function: str) -> NameUses:
+        uses = NameUses()
+        module = self._names.find_module(name)
+        owner, _, method = function.rpartition('.')
+        first = self._names.top_value(module, owner or function) if module else None
+        several = [first]
+        if isinstance(first, Class):
+            # The object is made with the node.
+            several = [self._names.attribute(first, each) for each in (method, '__init__')]
+        pending = [each for each in several if isinstance(each, Function)]
+        seen: set[int] = set()
+        while pending and len(seen) < _MOST_FUNCTIONS:
+            each = pending.pop()
+            if id(each.definition) not in seen:
+                seen.add(id(each.definition))
+                pending += self._read(each, uses)
+        return uses
+
+    def _read(self, function: Function, uses: NameUses) -> list[Function]:
+        """Note what a function does; return those that it mentions."""
+        scope = Scope(function.module, function.definition, {})
+        nodes = list_nodes([function.definition])
+        changed = {id(each) for node in nodes for each in self._changed_by(node, scope)}
+        stored = {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
+        found: list[Function] = []
+        for node in nodes:
+            if not isinstance(node, ast.Name | ast.Attribute):
+                continue
+            if isinstance(value := self._names.value_of(node, scope), Function):
+                found.append(value)
+            shared = self._shared(node, scope)
+            if shared is None:
+                continue
+            is_stored = isinstance(node.ctx, ast.Store | ast.Del)
+            if isinstance(node, ast.Name) and is_stored and node.id not in stored:
+                continue
+            is_change = is_stored or id(node) in changed
+            users = uses.changed if is_change else uses.read
+            users.setdefault(shared, span_of(function.module, node))
+        return found
+
+    def _shared(self, node: ast.Name | ast.Attribute, scope: Scope) -> SharedName | None:
+        """Return the shared object that an expression is."""
+        if isinstance(node, ast.Name):
+            if not self._names.is_local(node.id, scope):
+                return self._of_module(scope.module, node.id)
+            value = self._names.alias_of(node.id, scope)
+            if isinstance(value, ast.Name) and self._names.is_local(value.id, scope):
+                return None
+            if isinstance(node.ctx, ast.Load) and isinstance(value, ast.Name | ast.Attribute):
+                return self._shared(value, scope)
+            return None
+        owner = self._names.value_of(node.value, scope)
+        match owner:
+            case Class() if self._has_attribute(owner, node.attr):
+                return self._named(owner.module, f'{owner.definition.name}.{node.attr}')
+            case Instance() if isinstance(node.value, ast.Name):
+                shared = self._shared(node.value, scope)
+                return (shared[0], f'{shared[1]}.{node.attr}') if shared else None
+        home = self._names.module_of(node.value, scope)
+        return self._of_module(home, node.attr) if home is not None else None
+
+    def _has_attribute(self, of: Class, name: str) -> bool:
+        return any(
+            isinstance(each, ast.Assign | ast.AnnAssign)
+            and name in {node.id for node in ast.walk(each) if isinstance(node, ast.Name)}
+            for each in of.definition.body
+        )
+
+    def _of_module(self, module: ModuleSource, name: str) -> SharedName | None:
+        for _ in range(MOST_BASES):
+            home, name = self._names.origin_of(module, name)
+            if home is None:
+                return None
+            match self._names.top(home).statements.get(name):
+                case [(ast.Assign(value=ast.Name(id=other)), _)]:
+                    # The same object by another name.
+                    module, name = home, other
+                case [(ast.Assign() | ast.AnnAssign(), _), *_]:
+                    return self._named(home, name)
+                case _:
+                    return None
+        return None
+
+    def _changed_by(self, node: ast.AST, scope: Scope) -> list[ast.expr]:
+        """Return what a statement or call changes the inside of."""
+        match node:
+            case ast.Call(func=ast.Attribute(value=owner, attr=method)):
+                value = self._names.value_of(owner, scope)
+                filling = (
+                    FILLING.get(value.kind, _CHANGING) if isinstance(value, Made) else _CHANGING
+                )
+                is_known = not isinstance(value, External)
+                return [owner, *_owners(owner)] if is_known and method in filling else []
+            case ast.Subscript(value=owner, ctx=ast.Store() | ast.Del()):
+                return [owner, *_owners(owner)]
+            case ast.AugAssign(target=target):
+                return [target]
+        return []
+
+    def _named(self, module: ModuleSource, name: str) -> SharedName:
+        return self._names.name_of(module), name
+
+
+def _owners(node: ast.expr) -> list[ast.expr]:
+    """Return what an item belongs to: of `D['a'].append(1)`, D."""
+    found: list[ast.expr] = []
+    while isinstance(node, ast.Subscript):
+        node = node.value
+        found.append(node)
+    return found

@@ -1,0 +1,229 @@
+"""What a behaviour waits for in its thread: events, queues, locks, names of the state, time."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.node_uses.literals import number_of
+from composer.node_uses.names import own_nodes
+from composer.node_uses.reading import Awaited, Block
+from composer.node_uses.values import Chain, External, Made
+from composer.python_source.places import span_of
+
+if TYPE_CHECKING:
+    from composer.node_uses.current_run import Run
+    from composer.node_uses.values import Scope
+    from composer.python_source.modules import ModuleSource
+
+_PUTTING = frozenset({'put', 'put_nowait'})
+_QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
+# The methods that wait for something, by the class; and those that bring it about.
+WAITING: dict[str, frozenset[str]] = {
+    'threading.Event': frozenset({'wait'}),
+    'threading.Condition': frozenset({'wait', 'wait_for'}),
+    'threading.Barrier': frozenset({'wait'}),
+    'threading.Semaphore': frozenset({'acquire'}),
+    **dict.fromkeys(_QUEUES, frozenset({'get'})),
+    'concurrent.futures.Future': frozenset({'result', 'exception'}),
+}
+FILLING: dict[str, frozenset[str]] = {
+    'threading.Event': frozenset({'set'}),
+    'threading.Condition': frozenset({'notify', 'notify_all'}),
+    'threading.Barrier': frozenset({'wait', 'abort'}),
+    'threading.Semaphore': frozenset({'release'}),
+    **dict.fromkeys(_QUEUES, _PUTTING),
+    'concurrent.futures.Future': frozenset({'cancel', 'set_exception', 'set_result'}),
+}
+LOCK, THREAD = 'threading.Lock', 'threading.Thread'
+# Methods after which a wait is as before.
+_HARMLESS = frozenset({'clear', 'reset', 'task_done', 'acquire', 'release'})
+_ASKING = frozenset({'done', 'empty', 'full', 'is_set', 'qsize'})
+_CLOCKS = frozenset({'time.monotonic', 'time.perf_counter', 'time.time'})
+_WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
+
+
+def note_method(run: Run, owner: Made, call: ast.Call, name: str, scope: Scope) -> None:
+    """Note a call of a method of something that threads wait for."""
+    if owner.kind == LOCK:
+        _note_lock(run, owner, call, name, scope)
+    elif owner.kind in WAITING:
+        place = span_of(owner.module, owner.node)
+        made_at = f'{place.source.name}:{place.line}:{place.column}'
+        noun = f'this {owner.kind.rpartition(".")[2].lower()}'
+        _note(run, Awaited(owner.kind, made_at, noun, place), call, name, scope)
+
+
+def note_method_of_state(run: Run, held: str, call: ast.Call, name: str, scope: Scope) -> None:
+    """Note a call of a method of something that is kept in `node.state`."""
+    for kind, methods in FILLING.items():
+        if name in methods or name in WAITING[kind] or name in _ASKING:
+            _note(run, Awaited(kind, 'state', held), call, name, scope)
+
+
+def _note(run: Run, what: Awaited, call: ast.Call, name: str, scope: Scope) -> None:
+    is_wait = name in WAITING[what.kind]
+    if name in FILLING[what.kind]:
+        run.fill(what, scope)
+    elif not is_wait and name not in _HARMLESS:
+        run.reading.asked.add(what)
+    if is_wait and not _is_timed(name, call):
+        _block(run, what, scope, call)
+
+
+def _block(run: Run, what: Awaited, scope: Scope, node: ast.expr) -> None:
+    if scope.waits and not (run.doubts or run.broad_guards):
+        called_at = run.calls[0] if run.calls else None
+        run.reading.blocks.append(Block(what, span_of(scope.module, node), called_at))
+
+
+def _is_timed(name: str, call: ast.Call) -> bool:
+    """Return whether a wait ends by itself, or may."""
+    keywords = {each.arg: each.value for each in call.keywords}
+    if None in keywords or any(isinstance(each, ast.Starred) for each in call.args):
+        return True
+    is_taking = name in ('get', 'acquire')
+    blocks = keywords.pop('block', keywords.pop('blocking', call.args[0] if call.args else None))
+    if is_taking and blocks is not None:
+        is_true = isinstance(blocks, ast.Constant) and blocks.value is True
+        return not is_true or bool(keywords) or len(call.args) > 1
+    position = 1 if name == 'wait_for' or is_taking else 0
+    timeout = keywords.get('timeout', call.args[position] if len(call.args) > position else None)
+    return timeout is not None and not (
+        isinstance(timeout, ast.Constant) and timeout.value is None
+    )
+
+
+# Locks
+
+
+def _note_lock(run: Run, lock: Made, call: ast.Call, name: str, scope: Scope) -> None:
+    if name == 'acquire' and not (call.args or call.keywords):
+        take(run, lock, call, scope)
+        run.held_locks.append((lock, call.lineno))
+    elif name in ('acquire', 'release'):
+        run.held_locks = [each for each in run.held_locks if each[0] != lock]
+
+
+def take(run: Run, lock: Made, node: ast.expr, scope: Scope) -> None:
+    """Report that a lock is taken by who has it already."""
+    line = next((line for each, line in run.held_locks if each == lock), None)
+    if line is not None and scope.waits:
+        text = f'this waits for ever for a lock that the behaviour has taken in line {line}'
+        help_text = 'write threading.RLock, or take it in one place'
+        run.report('blocked-group', scope.module, node, text, help_text)
+
+
+# Time
+
+
+def note_sleep(run: Run, seconds: ast.expr, node: ast.expr, scope: Scope) -> None:
+    """Note how long the behaviour sleeps."""
+    number = number_of(_meant(run, seconds, scope))
+    if number is not None and scope.waits and not run.doubts:
+        run.reading.sleeps.append((float(number), span_of(scope.module, node)))
+
+
+def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
+    """Return what is assigned to a name, where it is assigned once."""
+    if not isinstance(node, ast.Name):
+        return node
+    stored = run.names.stored_in(scope.definition).get(node.id) if scope.definition else None
+    if stored is not None:
+        value, is_item = stored[0]
+        is_known = len(stored) == 1 and isinstance(value, ast.expr) and not is_item
+        return value if is_known and isinstance(value, ast.expr) else node
+    top = run.names.top(scope.module)
+    match top.statements.get(node.id):
+        case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
+            return node if node.id in top.stored_again else value
+    return node
+
+
+def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
+    """Note a loop that only others end, or only the clock."""
+    outs = [each for each in own_nodes(loop) if isinstance(each, _WAYS_OUT)]
+    test = loop.test
+    if isinstance(test, ast.Constant):
+        match loop.body, outs:
+            case [ast.If(test=inner, body=[ast.Break() | ast.Return()], orelse=[]), *_], [_]:
+                test = inner
+            case _:
+                return
+    elif outs:
+        return
+    limit = _limit_of(run, test, scope)
+    what = _only_name(run, test, scope)
+    if limit is not None:
+        note_sleep(run, limit, test, scope)
+    elif what is not None:
+        _block(run, what, scope, test)
+
+
+def _limit_of(run: Run, test: ast.expr, scope: Scope) -> ast.expr | None:
+    """Return how long a loop goes on that only the clock ends."""
+    match test:
+        case ast.Compare(
+            left=ast.BinOp(left=clock, op=ast.Sub()),
+            ops=[ast.Lt() | ast.LtE()],
+            comparators=[limit],
+        ):
+            return limit if _is_clock(run, clock, scope) else None
+        case ast.Compare(left=clock, ops=[ast.Lt() | ast.LtE()], comparators=[ast.Name() as end]):
+            match _meant(run, end, scope):
+                case ast.BinOp(left=begin, op=ast.Add(), right=limit):
+                    is_clock = _is_clock(run, clock, scope) and _is_clock(run, begin, scope)
+                    return limit if is_clock else None
+    return None
+
+
+def _is_clock(run: Run, node: ast.expr, scope: Scope) -> bool:
+    function = run.names.value_of(node.func, scope) if isinstance(node, ast.Call) else None
+    return isinstance(function, External) and function.name in _CLOCKS
+
+
+def _only_name(run: Run, test: ast.expr, scope: Scope) -> Awaited | None:
+    """Return the one name that others change, and on which alone a condition depends."""
+    found: set[Awaited] = set()
+    pending: list[ast.expr] = [test]
+    while pending:
+        node = pending.pop()
+        match node:
+            case ast.Constant():
+                continue
+            case ast.UnaryOp(operand=operand):
+                pending.append(operand)
+            case ast.Compare(left=left, comparators=others):
+                pending += [left, *others]
+            case ast.Name() | ast.Attribute():
+                what = _changed_name(run, node, scope)
+                if what is None:
+                    return None
+                found.add(what)
+            case _:
+                return None
+    return found.pop() if len(found) == 1 else None
+
+
+def _changed_name(run: Run, node: ast.Name | ast.Attribute, scope: Scope) -> Awaited | None:
+    match run.names.value_of(node, scope):
+        case Chain(path=('node', 'state', name)):
+            # A name that it was copied to stays as it is.
+            return Awaited('', 'state', name) if isinstance(node, ast.Attribute) else None
+    if not isinstance(node, ast.Name):
+        return None
+    return global_name(run, node.id, scope)
+
+
+def global_name(run: Run, name: str, scope: Scope) -> Awaited | None:
+    """Return a name of a module that functions store."""
+    is_own = scope.definition is not None and (
+        name in run.names.stored_in(scope.definition) or name in scope.given
+    )
+    if is_own or name not in run.names.top(scope.module).stored_again:
+        return None
+    return Awaited('', _path_of(scope.module), name)
+
+
+def _path_of(module: ModuleSource) -> str:
+    return str(module.path)

@@ -1,0 +1,928 @@
+"""Walks through the code of a behaviour, and of the functions of the project that it calls."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING
+
+from composer.node_uses import node_calls, waiting
+from composer.node_uses.current_run import Run
+from composer.node_uses.reading import Awaited, MessageUse, StateUse
+from composer.node_uses.ros_members import ros_members
+from composer.node_uses.values import (
+    Chain,
+    Class,
+    External,
+    Function,
+    Instance,
+    Made,
+    Scope,
+    Texts,
+    Value,
+)
+from composer.python_source.local_names import list_arguments
+from composer.python_source.modules import FunctionSource, read_signature
+from composer.python_source.places import span_of
+from composer.python_source.syntax import list_children
+from composer.spelling import suggest
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from composer.node_uses.names import Names
+
+# Longer chains of calls are not followed, and the node that is given to one may do anything.
+_DEEPEST = 5
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+_TESTS = frozenset(
+    {'callable', 'get_fields_and_field_types', 'getattr', 'hasattr', 'isinstance', 'type'}
+)
+_ENDS = (ast.Return, ast.Raise, ast.Break, ast.Continue)
+NODE_ATTRIBUTES = frozenset(
+    {'logger', 'name', 'own_state', 'parameters', 'ros', 'state', 'stopping'}
+)
+LOGGER_NAMES = frozenset(
+    {
+        *('debug', 'error', 'fatal', 'get_child', 'get_effective_level', 'info', 'log', 'name'),
+        *('is_enabled_for', 'set_level', 'warn', 'warning'),
+    }
+)
+# What behaviours write for methods of rclpy's node.
+_OF_RCLPY = {
+    'declare_parameter': "declare it under 'parameters:' of the node",
+    'get_logger': 'write node.logger',
+    'get_name': 'write node.name',
+    'get_parameter': 'write node.parameters.NAME',
+}
+_OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
+# Functions that keep nothing of what they are given.
+_HARMLESS = frozenset(
+    f'builtins.{name}'
+    for name in (
+        *('bool', 'callable', 'dict', 'format', 'hasattr', 'id', 'isinstance', 'len', 'list'),
+        *('print', 'repr', 'sorted', 'str', 'tuple', 'type'),
+    )
+)
+# What changes a list or an array of a message.
+_MUTATORS = frozenset(
+    {
+        *('append', 'byteswap', 'clear', 'extend', 'fill', 'frombytes', 'insert', 'pop', 'put'),
+        *('remove', 'resize', 'reverse', 'sort'),
+    }
+)
+# What a wrong name raises, and what catches it.
+_CATCHING = frozenset(
+    {
+        *('AttributeError', 'ComposerError', 'KeyError', 'LookupError', 'NameError'),
+        *('PayloadError', 'TypeError', 'UndeclaredError', 'UndeclaredParameterError'),
+        'ValueError',
+    }
+)
+_CATCHING_ALL = frozenset({'BaseException', 'Exception'})
+_DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
+_WITHOUT_EFFECT = (ast.Dict, ast.List, ast.Set, ast.Tuple, ast.Compare, ast.JoinedStr)
+# What raises RuntimeError where no loop of asyncio runs.
+_OF_LOOP = frozenset(
+    f'asyncio.{name}'
+    for name in (
+        *('gather', 'open_connection', 'sleep', 'start_server', 'timeout', 'to_thread', 'wait'),
+        *('wait_for', 'create_subprocess_exec', 'create_subprocess_shell', 'TaskGroup'),
+    )
+)
+_INSTEAD = {
+    'asyncio.gather': 'await one after the other',
+    'asyncio.sleep': 'call time.sleep, in a group of its own; in a timer, write a generator',
+}
+
+
+class Walk:
+    """Notes what one behaviour does.
+
+    Attributes:
+        followed: The functions that were walked through, by their syntax trees.
+    """
+
+    def __init__(self, names: Names, followed: set[int]) -> None:
+        self.run = Run(names)
+        self.followed = followed
+        self._names = names
+        self._depth = 0
+        self._entered: set[object] = set()
+        self._asked: dict[int, set[str]] = {}
+        # The names by which the file or the state decides, by function.
+        self._result: set[int] = set()
+
+    # Functions
+
+    def enter(self, function: Function, given: dict[str, Value], *, is_waited: bool) -> None:
+        """Walk through a function that is called."""
+        definition, run = function.definition, self.run
+        arguments = [each.arg for each in list_arguments(definition.args)]
+        if function.bound is not None and arguments:
+            given = {**given, arguments[0]: function.bound}
+        key = (
+            *(id(definition), is_waited, frozenset(given.items()), run.is_certain, run.doubts > 0),
+            *(run.guards > 0, tuple(lock for lock, _ in run.held_locks)),
+        )
+        if key in self._entered:
+            return
+        self._entered.add(key)
+        stored = self._names.stored_in(definition)
+        chains = {name: value for name, value in given.items() if isinstance(value, Chain)}
+        for name, chain in chains.items():
+            if name in stored or self._depth >= _DEEPEST:
+                run.escape(chain)
+        if self._depth >= _DEEPEST:
+            return
+        self.followed.add(id(definition))
+        scope = Scope(function.module, definition, given, function.scope, waits=is_waited)
+        run.reading.modules.setdefault(id(function.module), function.module)
+        before = run.standing
+        self._depth += 1
+        if isinstance(definition, ast.Lambda):
+            self.visit(definition.body, scope)
+        else:
+            self._block(definition.body, scope)
+        self._depth -= 1
+        run.standing = before
+
+    def _follow(
+        self, function: Function, call: ast.Call, scope: Scope, *, is_waited: bool
+    ) -> None:
+        """Walk through a function of the project that is called here."""
+        definition = function.definition
+        signature = read_signature(definition.args)
+        parameters = list(signature.parameters.values())
+        if function.bound is not None:
+            signature = signature.replace(parameters=parameters[1:])
+        misfit = node_calls.explain_misfit(signature, call)
+        if misfit is not None:
+            name = getattr(definition, 'name', 'the function')
+            text = f'{name}() is called with other arguments: {misfit}'
+            self.run.report('bad-call', scope.module, call, text, None)
+            return
+        given = self._names.bind(function, call, scope)
+        is_open = any(isinstance(each, ast.Starred) for each in call.args)
+        for node in (*call.args, *(each.value for each in call.keywords)):
+            value = self._names.value_of(node, scope)
+            if is_open or not isinstance(value, Chain) or value not in given.values():
+                self.visit(node, scope)
+            elif value.path[0] in ('message', 'made'):
+                self._use_message(value, node, scope)
+            else:
+                self._note_read(value, node, scope)
+        self.run.calls.append(span_of(scope.module, call))
+        self.enter(function, given, is_waited=is_waited and scope.waits)
+        self.run.calls.pop()
+
+    def _hand_on(self, function: Function, given: Sequence[Value | None]) -> None:
+        """Walk through a function that something may call later, with these arguments first."""
+        definition = function.definition
+        names = [each.arg for each in (*definition.args.posonlyargs, *definition.args.args)]
+        names = names[1:] if function.bound is not None else names
+        pairs = zip(names, given, strict=False)
+        self.enter(
+            function, {name: value for name, value in pairs if value is not None}, is_waited=False
+        )
+
+    # Statements
+
+    def _block(self, body: Sequence[ast.stmt], scope: Scope) -> None:
+        for statement in body:
+            self._statement(statement, scope)
+
+    def _statement(self, node: ast.stmt, scope: Scope) -> None:
+        match node:
+            case ast.If() | ast.While():
+                self._branch(node, scope)
+            case ast.Try() | ast.TryStar():
+                self._try(node, scope)
+            case ast.With() | ast.AsyncWith():
+                self._with(node, scope)
+            case ast.For() | ast.AsyncFor():
+                self.visit(node.iter, scope)
+                self.visit(node.target, scope)
+                self._block(node.body, scope)
+                self._else(node.orelse, scope)
+            case ast.Match():
+                self.visit(node.subject, scope)
+                chosen = self._chosen_by([node.subject], scope)
+                for case in node.cases:
+                    with self.run.condition(chosen):
+                        if case.guard is not None:
+                            self.visit(case.guard, scope)
+                        self._block(case.body, scope)
+                self._doubt_rest(node, chosen)
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                inner = Function(scope.module, node, None, scope)
+                self.enter(inner, {}, is_waited=False)
+            case ast.ClassDef():
+                self._block(node.body, scope)
+            case ast.Expr():
+                self._expression(node.value, scope)
+            case ast.Global(names=names):
+                self._note_globals(names, scope)
+            case ast.AugAssign(target=target, value=value):
+                self.visit(value, scope)
+                if not self._read_target(target, scope):
+                    self.visit(target, scope)
+            case ast.Assign(targets=targets, value=value):
+                self._assign(targets, value, scope)
+            case ast.Return(value=ast.expr() as value):
+                self.visit(value, scope)
+            case _:
+                for child in list_children(node):
+                    if isinstance(child, ast.expr):
+                        self.visit(child, scope)
+
+    def _note_globals(self, names: Sequence[str], scope: Scope) -> None:
+        stored = {
+            each.id
+            for each in ast.walk(scope.definition or ast.Pass())
+            if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
+        }
+        for name in names:
+            what = waiting.global_name(self.run, name, scope)
+            if what is not None and name in stored:
+                self.run.fill(what, scope)
+
+    def _branch(self, node: ast.If | ast.While, scope: Scope) -> None:
+        chosen = self._chosen_by([node.test], scope)
+        self.visit(node.test, scope)
+        if isinstance(node, ast.While):
+            waiting.note_loop(self.run, node, scope)
+        with self.run.condition(chosen):
+            self._block(node.body, scope)
+            if isinstance(node, ast.While):
+                self._else(node.orelse, scope)
+            else:
+                self._block(node.orelse, scope)
+        self._doubt_rest(node, chosen)
+
+    def _else(self, body: Sequence[ast.stmt], scope: Scope) -> None:
+        """Walk through what comes only where a loop did not break, or nothing was raised."""
+        with self.run.condition('file'):
+            self._block(body, scope)
+
+    def _doubt_rest(self, node: ast.AST, chosen: str) -> None:
+        """Note that what follows is only reached where a branch does not end before."""
+        if any(isinstance(each, _ENDS) for each in ast.walk(node)):
+            self.run.doubt(chosen)
+
+    def _try(self, node: ast.Try | ast.TryStar, scope: Scope) -> None:
+        is_guard = any(map(_is_guard, node.handlers))
+        with self.run.guard(is_guard=is_guard, is_broad=any(map(_is_broad, node.handlers))):
+            self._block(node.body, scope)
+        for handler in node.handlers:
+            with self.run.guard(is_guard=is_guard):
+                self._block(handler.body, scope)
+        self._else(node.orelse, scope)
+        self._block(node.finalbody, scope)
+
+    def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        held = [*self.run.held_locks]
+        is_guard = False
+        for item in node.items:
+            value = self._names.value_of(item.context_expr, scope)
+            if isinstance(value, Made) and value.kind == waiting.LOCK:
+                waiting.take(self.run, value, item.context_expr, scope)
+                self.run.held_locks.append((value, item.context_expr.lineno))
+            self.visit(item.context_expr, scope)
+            if item.optional_vars is not None:
+                self.visit(item.optional_vars, scope)
+            if isinstance(item.context_expr, ast.Call):
+                func = self._names.value_of(item.context_expr.func, scope)
+                # One of the project may catch what its body raises.
+                is_guard |= isinstance(func, Class) or bool(
+                    _words(item.context_expr.func) & {'raises', 'suppress'}
+                )
+                is_guard |= func is None and isinstance(item.context_expr.func, ast.Name)
+        with self.run.guard(is_guard=is_guard):
+            self._block(node.body, scope)
+        self.run.held_locks = held
+
+    def _assign(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope) -> None:
+        """Walk through an assignment; the node may have another name, or be kept in its object."""
+        known = self._names.value_of(value, scope)
+        is_kept = isinstance(known, Chain | Function) and all(
+            isinstance(each, ast.Name) or self._names.value_of(each, scope) == known
+            for each in targets
+        )
+        if isinstance(value, ast.Tuple) and all(isinstance(each, ast.Tuple) for each in targets):
+            for target in targets:
+                for one, other in zip(getattr(target, 'elts', ()), value.elts, strict=False):
+                    self._assign([one], other, scope)
+            return
+        if not is_kept or isinstance(value, ast.Call):
+            self.visit(value, scope)
+        elif isinstance(known, Chain):
+            self._note_read(known, value, scope)
+        for target in targets:
+            self.visit(target, scope)
+        match targets, value:
+            case [ast.Name(id=name)], ast.Call(func=func) if self._is_coroutine(func, scope):
+                loads = [
+                    each
+                    for each in ast.walk(scope.definition or ast.Pass())
+                    if isinstance(each, ast.Name | ast.Global) and getattr(each, 'id', '') == name
+                ]
+                if len(loads) == 1 and scope.definition is not None:
+                    text = f"'{name}' is a coroutine that is never awaited, so it never runs"
+                    help_text = 'put await before it'
+                    self.run.report('missing-await', scope.module, value, text, help_text)
+
+    def _read_target(self, target: ast.expr, scope: Scope) -> bool:
+        """Note that `x += 1` reads x, too; return whether it does not make it."""
+        match self._names.value_of(target, scope):
+            case Chain(path=('node', 'state', name)):
+                self.run.use_state(name, scope.module, target)
+                self.run.fill(Awaited('', 'state', name), scope)
+                return True
+        match target:
+            case ast.Subscript(value=inner, slice=key):
+                if self._names.value_of(inner, scope) == Chain(('node', 'own_state')):
+                    self._read_own_state(key, scope)
+        return False
+
+    def _expression(self, node: ast.expr, scope: Scope) -> None:
+        """Walk through an expression whose value nothing takes."""
+        run, module = self.run, scope.module
+        self.visit(node, scope)
+        if isinstance(node, _WITHOUT_EFFECT):
+            run.report('no-effect', module, node, 'this has no effect', 'return it, or remove it')
+        elif isinstance(node, ast.Attribute):
+            match self._names.value_of(node, scope):
+                case Chain(path=('node', name)) if name in node_calls.NODE_METHODS:
+                    run.report('no-effect', module, node, 'this is not called', f'write {name}()')
+        elif isinstance(node, ast.Call) and self._is_coroutine(node.func, scope):
+            text = f"'{ast.unparse(node.func)}(…)' is never awaited, so it never runs"
+            run.report('missing-await', module, node.func, text, 'put await before it')
+        elif isinstance(node, ast.Call) and self._is_generator(node.func, scope):
+            text = 'this makes a generator, and nothing goes through it'
+            run.report('no-effect', module, node, text, "write 'yield from' before it")
+        elif isinstance(node, ast.Call):
+            match self._names.value_of(node, scope):
+                case Made(kind=waiting.THREAD):
+                    text = 'this thread is never started'
+                    run.report('no-effect', module, node, text, 'write .start()')
+
+    def _is_coroutine(self, func: ast.expr, scope: Scope) -> bool:
+        match self._names.value_of(func, scope):
+            case Chain(path=('node', 'call_async') | ('goal', _, 'result_async')):
+                return True
+            case Function(definition=ast.AsyncFunctionDef() as definition):
+                kind = FunctionSource(definition).kind
+                return kind is not None and not kind.is_generator
+        return False
+
+    def _is_generator(self, func: ast.expr, scope: Scope) -> bool:
+        match self._names.value_of(func, scope):
+            case Function(definition=ast.FunctionDef() as definition):
+                kind = FunctionSource(definition).kind
+                return kind is not None and kind.is_generator
+        return False
+
+    # Conditions
+
+    def _chosen_by(self, tests: Sequence[ast.expr], scope: Scope) -> str:
+        """Return what decides on a condition: `fixed`, `file`, `state`, or something else."""
+        found: set[str] = set()
+        pending: list[ast.AST] = [*tests]
+        seen: set[str] = set()
+        while pending:
+            node = pending.pop()
+            if isinstance(node, ast.Attribute | ast.Name):
+                match self._names.value_of(node, scope):
+                    case Chain(path=('node', 'name', *_)):
+                        found.add('fixed')
+                    case Chain(path=('node', 'parameters', *_)) | Texts():
+                        found.add('file')
+                    case Chain(path=('node', 'state' | 'own_state', *_)):
+                        found.add('state')
+            found.add('fixed' if _asks_what_it_is(node) else '')
+            if isinstance(node, ast.Name) and node.id not in seen:
+                seen.add(node.id)
+                found.add('file' if self._is_given(node.id, scope) else '')
+                found.add('fixed' if self._is_constant(node.id, scope) else '')
+                pending += self._assigned(node.id, scope)
+            if not isinstance(node, ast.Lambda):
+                pending += list_children(node)
+        return next((each for each in ('fixed', 'file', 'state') if each in found), '')
+
+    def _is_given(self, name: str, scope: Scope) -> bool:
+        """Return whether a name is an argument of which nothing is known, or a constant."""
+        within: Scope | None = scope
+        while within is not None and within.definition is not None:
+            if name in self._names.stored_in(within.definition):
+                return False
+            if name in {each.arg for each in list_arguments(within.definition.args)}:
+                return not isinstance(within.given.get(name), Chain | Instance | Class)
+            within = within.outer
+        return False
+
+    def _is_constant(self, name: str, scope: Scope) -> bool:
+        """Return whether a name is one that a module never changes, or imports."""
+        match self._names.top(scope.module).statements.get(name):
+            case [(ast.Assign(value=ast.Constant()) | ast.ImportFrom(), _), *_]:
+                return name.isupper()
+        return False
+
+    def _assigned(self, name: str, scope: Scope) -> list[ast.AST]:
+        if scope.definition is None:
+            return []
+        stored = self._names.stored_in(scope.definition).get(name, [])
+        return [value for value, _ in stored if value is not None]
+
+    def _asked_in(self, scope: Scope) -> set[str]:
+        """Return the parameters that a function asks whether they have a value."""
+        if scope.definition is None:
+            return set()
+        key = id(scope.definition)
+        if key not in self._asked:
+            self._asked[key] = set()
+            for test in _tests_in(scope.definition):
+                for node in ast.walk(test):
+                    if isinstance(node, ast.Attribute | ast.Name):
+                        match self._names.value_of(node, scope):
+                            case Chain(path=('node', 'parameters', name, *_)):
+                                self._asked[key].add(name)
+        return self._asked[key]
+
+    def need(self, node: ast.expr, scope: Scope) -> None:
+        """Note that something has to have a value: a parameter may be unset."""
+        match self._names.value_of(node, scope):
+            case Chain(path=('node', 'parameters', name)):
+                is_ready = self.run.guards or self.run.broad_guards or self.run.doubts
+                if name not in _OF_MAPPING and not is_ready and name not in self._asked_in(scope):
+                    place = span_of(scope.module, node)
+                    self.run.reading.values_needed.append((name, place))
+
+    # Expressions
+
+    def visit(self, node: ast.expr, scope: Scope) -> None:
+        """Walk through an expression."""
+        match node:
+            case ast.Name() | ast.Attribute() | ast.Subscript():
+                self._visit_name(node, scope)
+            case ast.Call():
+                self._call(node, scope)
+            case ast.Await(value=value):
+                self._await(value, scope)
+            case ast.Lambda():
+                self.enter(Function(scope.module, node, None, scope), {}, is_waited=False)
+            case ast.IfExp(test=test, body=body, orelse=other):
+                self.visit(test, scope)
+                with self.run.condition(self._chosen_by([test], scope)):
+                    self.visit(body, scope)
+                    self.visit(other, scope)
+            case ast.BoolOp(values=[first, *rest]):
+                self.visit(first, scope)
+                with self.run.condition(self._chosen_by([first], scope)):
+                    for each in rest:
+                        self.visit(each, scope)
+            case ast.Compare():
+                self._compare(node, scope)
+            case _:
+                if isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Mod):
+                    self.need(node.left, scope)
+                    self.need(node.right, scope)
+                self._visit_all(node, scope)
+
+    def _visit_all(self, node: ast.AST, scope: Scope) -> None:
+        for child in list_children(node):
+            if isinstance(child, ast.expr):
+                self.visit(child, scope)
+            else:
+                self._visit_all(child, scope)
+
+    def _visit_name(self, node: ast.Name | ast.Attribute | ast.Subscript, scope: Scope) -> None:
+        value = self._names.value_of(node, scope)
+        if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            # The name may stand for a part of the node from here on.
+            owner = (
+                self._names.value_of(node.value, scope)
+                if isinstance(node, ast.Attribute)
+                else None
+            )
+            value = (
+                self._names.attribute(owner, node.attr)
+                if isinstance(owner, Chain) and isinstance(node, ast.Attribute)
+                else None
+            )
+        if isinstance(value, Chain):
+            self._use(value, node, scope)
+            return
+        if isinstance(node, ast.Subscript):
+            self._subscript(node, scope)
+        elif isinstance(node, ast.Attribute):
+            self.visit(node.value, scope)
+        elif isinstance(node.ctx, ast.Load):
+            self._check_defined(node, scope)
+            if isinstance(value, Function):
+                self._hand_on(value, [])
+
+    def _check_defined(self, node: ast.Name, scope: Scope) -> None:
+        top = self._names.top(scope.module)
+        if top.is_open or top.is_dynamic or node.id in top.all_stored or node.id[:2] == '__':
+            return
+        if self._names.top_value(scope.module, node.id) is None:
+            text = f"'{node.id}' is not defined"
+            help_text = suggest(node.id, top.all_stored)
+            self.run.report('undefined-name', scope.module, node, text, help_text)
+
+    def _subscript(self, node: ast.Subscript, scope: Scope) -> None:
+        is_stored = isinstance(node.ctx, ast.Store)
+        key = node.slice
+        match self._names.value_of(node.value, scope):
+            case Chain(path=('node', 'parameters')) if is_stored:
+                self._refuse_parameter(key, scope)
+            case Chain(path=('node', 'parameters') | ('changes',) as path):
+                named = self._names.value_of(key, scope)
+                self.run.use('parameter', named, is_change=path == ('changes',))
+            case Chain(path=('node', 'own_state')):
+                named = self._names.value_of(key, scope)
+                if not isinstance(named, Texts):
+                    self.run.reading.is_own_state_open = True
+                elif is_stored:
+                    self.run.reading.own_state_set |= {text for text, _, _ in named.options}
+                else:
+                    self._read_own_state(key, scope)
+            case Chain(path=('node', 'state')):
+                text = "the node's state has attributes, and no items"
+                help_text = 'write node.state.NAME'
+                self.run.report('unknown-attribute', scope.module, node, text, help_text)
+            case _:
+                self.visit(node.value, scope)
+        self.visit(key, scope)
+
+    def _read_own_state(self, key: ast.expr, scope: Scope) -> None:
+        named = self._names.value_of(key, scope)
+        is_guarded = bool(self.run.guards or self.run.doubts)
+        for text, node, module in named.options if isinstance(named, Texts) else ():
+            use = StateUse(text, span_of(module, node, text), is_guarded)
+            self.run.reading.own_state_read.append(use)
+
+    def _compare(self, node: ast.Compare, scope: Scope) -> None:
+        operands = [node.left, *node.comparators]
+        match node:
+            case ast.Compare(ops=[ast.In() | ast.NotIn()], comparators=[container]):
+                named = self._names.value_of(node.left, scope)
+                match self._names.value_of(container, scope):
+                    case Chain(path=('node', 'parameters') | ('changes',) as path):
+                        is_change = path == ('changes',)
+                        self.run.ask('parameter', named, is_change=is_change)
+                        operands = [node.left]
+                    case Chain(path=('node', 'own_state')) if isinstance(named, Texts):
+                        self.run.reading.own_state_set |= {text for text, _, _ in named.options}
+                        operands = [node.left]
+            case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE()]):
+                for operand in operands:
+                    self.need(operand, scope)
+            case ast.Compare(ops=[ast.Eq() | ast.NotEq()], comparators=[ast.Constant()]):
+                left = self._names.value_of(node.left, scope)
+                if isinstance(left, Chain) and left.path[0] in ('message', 'made'):
+                    self._use_message(left, node.left, scope, node)
+                    return
+        for operand in operands:
+            self.visit(operand, scope)
+
+    # The node and its parts
+
+    def _use(
+        self, chain: Chain, node: ast.Name | ast.Attribute | ast.Subscript, scope: Scope
+    ) -> None:
+        """Note a use of something that the behaviour is given, outside a call of it."""
+        if chain.path[0] in ('message', 'made'):
+            self._use_message(chain, node, scope)
+            return
+        is_stored = not isinstance(node.ctx, ast.Load)
+        match chain.path:
+            case ('node', 'state', name) if is_stored:
+                self.run.set_state(name, scope)
+            case ('node', 'parameters', name) if is_stored:
+                self._refuse_parameter(node, scope, name)
+            case ('node', name) if is_stored:
+                if name not in NODE_ATTRIBUTES:
+                    text = f"the node takes no attribute '{name}'"
+                    help_text = f'keep it in node.state.{name}'
+                    self.run.report('unknown-attribute', scope.module, node, text, help_text)
+            case ('node', 'own_state', name) if is_stored:
+                text = f"own_state takes no attribute '{name}'"
+                help_text = f'it is a dictionary: write [{name!r}]'
+                self.run.report('unknown-attribute', scope.module, node, text, help_text)
+            case _:
+                self.run.escape(chain)
+                self._note_read(chain, node, scope)
+
+    def _note_read(self, chain: Chain, node: ast.expr, scope: Scope) -> None:
+        run = self.run
+        match chain.path:
+            case ('node', 'parameters', name, *_) if name not in _OF_MAPPING:
+                owner = _prefix(node, name)
+                if isinstance(owner, ast.Attribute):
+                    named = Texts(((name, owner, scope.module),))
+                    run.use('parameter', named)
+            case ('node', 'parameters', _, *_):
+                run.reading.open_kinds.add('parameter')
+            case ('node', 'state', name, *_):
+                owner = _prefix(node, name)
+                if name.startswith('__'):
+                    run.reading.is_state_open = True
+                elif isinstance(owner, ast.Attribute):
+                    run.use_state(name, scope.module, owner)
+            case ('node', 'ros', *_):
+                run.reading.reaches_ros = True
+                run.reading.open_kinds.add('parameter')
+            case ('node', 'logger', name, *_) if name not in LOGGER_NAMES:
+                self._unknown("the node's logger", name, LOGGER_NAMES, _prefix(node, name), scope)
+            case ('node', method, name) if method in node_calls.NODE_METHODS and not hasattr(
+                _prefix, name
+            ):
+                text = f"'{name}' is read of the method '{method}', which is not called"
+                help_text = f'write {method}().{name}'
+                run.report('unknown-attribute', scope.module, node, text, help_text)
+            case ('node', 'own_state', name, *_) if not hasattr(dict, name):
+                text, help_text = f"own_state has no '{name}'", f'write [{name!r}]'
+                run.report('unknown-attribute', scope.module, node, text, help_text)
+            case ('node', name, *_) if name not in node_calls.NODE_METHODS | NODE_ATTRIBUTES:
+                if not name.startswith('__'):
+                    known = node_calls.NODE_METHODS | NODE_ATTRIBUTES
+                    self._unknown('the node', name, known, _prefix(node, name), scope)
+
+    def _unknown(
+        self, owner: str, name: str, known: frozenset[str], node: ast.expr, scope: Scope
+    ) -> None:
+        help_text = suggest(name, known, 'it has')
+        if owner == 'the node' and (name in _OF_RCLPY or name in ros_members()):
+            help_text = _OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
+        text = f"{owner} has no attribute '{name}'"
+        self.run.report('unknown-attribute', scope.module, node, text, help_text)
+
+    def _refuse_parameter(self, node: ast.expr, scope: Scope, name: str = '') -> None:
+        named = self._names.value_of(node, scope)
+        if isinstance(named, Texts):
+            name = named.options[0][0]
+        text = f"this does not set the parameter '{name or '…'}'"
+        help_text = f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?'
+        self.run.report('unset-parameter', scope.module, node, text, help_text)
+
+    def _use_message(
+        self, chain: Chain, node: ast.expr, scope: Scope, compared: ast.Compare | None = None
+    ) -> None:
+        run = self.run
+        is_write = not isinstance(getattr(node, 'ctx', None), ast.Load)
+        of_type = chain.path[1] if chain.path[0] == 'made' else None
+        path = chain.path[2 if of_type else 1 :]
+        is_patched = bool(self._names.top(scope.module).patched & {*path})
+        is_guarded = run.guards or run.broad_guards or run.fixed or is_patched
+        if path and (is_write or not is_guarded):
+            use = MessageUse(path, node, scope.module, is_write, compared, not run.doubts, of_type)
+            run.reading.message_uses.append(use)
+        for inner in ast.walk(node):
+            if isinstance(inner, ast.Subscript):
+                self.visit(inner.slice, scope)
+
+    # Calls
+
+    def _await(self, value: ast.expr, scope: Scope) -> None:
+        if not isinstance(value, ast.Call):
+            self.visit(value, scope)
+            return
+        func = self._names.value_of(value.func, scope)
+        match func:
+            case Chain(path=('node', name)) if name in node_calls.NODE_METHODS - {'call_async'}:
+                text = 'what is awaited here is no coroutine'
+                self.run.report('missing-await', scope.module, value, text, 'leave out the await')
+            case External(name=name) if name in _OF_LOOP and scope.waits:
+                is_zero = bool(value.args) and ast.unparse(value.args[0]) in ('0', '0.0')
+                if not (name == 'asyncio.sleep' and is_zero):
+                    needs = f'{name} needs the event loop of asyncio'
+                    text = f'{needs}, and behaviours run in that of ROS'
+                    help_text = _INSTEAD.get(name)
+                    self.run.report('no-event-loop', scope.module, value, text, help_text)
+        self._call(value, scope, is_awaited=True)
+
+    def _call(self, call: ast.Call, scope: Scope, *, is_awaited: bool = False) -> None:
+        func = self._names.value_of(call.func, scope)
+        match func:
+            case Chain():
+                self._call_chain(func, call, scope, is_awaited=is_awaited)
+                return
+            case Function():
+                is_later = isinstance(func.definition, ast.AsyncFunctionDef) and not is_awaited
+                self._follow(func, call, scope, is_waited=not is_later)
+                return
+            case Class() as of:
+                instance = self._names.instance_of(of, None, scope)
+                init = self._names.attribute(instance, '__init__')
+                if isinstance(init, Function):
+                    bound = Function(
+                        init.module, init.definition, self._names.instance_of(of, call, scope)
+                    )
+                    self._follow(bound, call, scope, is_waited=True)
+                    return
+            case External(name='time.sleep') if call.args:
+                waiting.note_sleep(self.run, call.args[0], call, scope)
+            case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):
+                if self._call_attribute(func.name, call, scope):
+                    return
+        owner = call.func.value if isinstance(call.func, ast.Attribute) else None
+        made = self._names.value_of(owner, scope) if owner is not None else None
+        if isinstance(made, Made) and isinstance(call.func, ast.Attribute):
+            waiting.note_method(self.run, made, call, call.func.attr, scope)
+        if not isinstance(call.func, ast.Name):
+            self.visit(call.func, scope)
+        else:
+            self._check_defined(call.func, scope)
+        self._pass_on(call, func, scope)
+
+    def _pass_on(self, call: ast.Call, func: Value | None, scope: Scope) -> None:
+        """Walk through what is given to something unknown; functions may be called by it."""
+        nodes = [*call.args, *(each.value for each in call.keywords)]
+        inner = [each for node in nodes for each in (getattr(node, 'elts', None) or [node])]
+        values = [self._names.value_of(each, scope) for each in inner]
+        functions = [each for each in values if isinstance(each, Function)]
+        if functions and Chain(('node',)) in values:
+            # `Thread(target=work, args=(node,))`, `partial(work, node)`
+            given = [value for value in values if not isinstance(value, Function)]
+            for function in functions:
+                self._hand_on(function, given)
+            nodes = [
+                node
+                for node, value in zip(inner, values, strict=True)
+                if not isinstance(value, Function) and value != Chain(('node',))
+            ]
+        is_harmless = isinstance(func, External) and func.name in _HARMLESS
+        for node in nodes:
+            value = self._names.value_of(node, scope)
+            if is_harmless and isinstance(value, Chain) and value.path[0] == 'node':
+                if value.path != ('node',):
+                    self._note_read(value, node, scope)
+                continue
+            if isinstance(func, External) and func.name in ('builtins.float', 'builtins.int'):
+                self.need(node, scope)
+            self.visit(node, scope)
+        if isinstance(func, External) and func.name == waiting.THREAD and scope.waits:
+            self._check_target(call, scope)
+
+    def _check_target(self, call: ast.Call, scope: Scope) -> None:
+        """Report a target of a thread that is called right here."""
+        for keyword in call.keywords:
+            target = keyword.value
+            if keyword.arg == 'target' and isinstance(target, ast.Call):
+                called = self._names.value_of(target.func, scope)
+                if isinstance(called, Function) and not _gives(called.definition):
+                    text = 'this is called here, and the thread runs nothing'
+                    help_text = f'give it {ast.unparse(target.func)}, and args=(…)'
+                    self.run.report('no-effect', scope.module, target, text, help_text)
+
+    def _call_chain(self, chain: Chain, call: ast.Call, scope: Scope, *, is_awaited: bool) -> None:
+        run = self.run
+        is_noted = True
+        match chain.path:
+            case ('node', method) if method in node_calls.NODE_METHODS:
+                self._call_node(method, call, scope, is_awaited=is_awaited)
+                return
+            case ('node', 'parameters' as owner, 'get') | ('changes' as owner, 'get'):
+                named = self._names.value_of(call.args[0], scope) if call.args else None
+                has_default = len(call.args) + len(call.keywords) > 1 or owner == 'changes'
+                run.ask('parameter', named, has_default=has_default, is_change=owner == 'changes')
+            case ('changes', *_):
+                run.reading.open_kinds.add('parameter')
+            case ('node', 'own_state', method):
+                self._call_own_state(method, call, scope)
+            case ('node', 'state', name, method):
+                waiting.note_method_of_state(run, name, call, method, scope)
+                is_noted = False
+            case ('goal', *_):
+                node_calls.note_goal(run, chain, call, scope, is_awaited=is_awaited)
+            case ('message', *path, method):
+                if method in _MUTATORS and path and isinstance(call.func, ast.Attribute):
+                    use = MessageUse(tuple(path), call.func.value, scope.module, is_write=True)
+                    run.reading.message_uses.append(use)
+                elif path and isinstance(call.func, ast.Attribute):
+                    self.visit(call.func.value, scope)
+            case _:
+                is_noted = False
+        if not is_noted:
+            self._note_read(chain, call.func, scope)
+        self._pass_on(call, None, scope)
+
+    def _call_node(self, method: str, call: ast.Call, scope: Scope, *, is_awaited: bool) -> None:
+        run = self.run
+        if method == 'sleep' and call.args:
+            waiting.note_sleep(run, call.args[0], call.args[0], scope)
+        later = node_calls.note_call(run, method, call, scope, is_awaited=is_awaited)
+        for function, given in later:
+            self._hand_on(function, given)
+        for position, node in enumerate((*call.args, *(each.value for each in call.keywords))):
+            value = self._names.value_of(node, scope)
+            if isinstance(value, Function) and method.startswith('create_'):
+                continue
+            if position and method == 'publish':
+                for needed in node.values if isinstance(node, ast.Dict) else [node]:
+                    self.need(needed, scope)
+            self.visit(node, scope)
+
+    def _call_own_state(self, method: str, call: ast.Call, scope: Scope) -> None:
+        reading = self.run.reading
+        named = self._names.value_of(call.args[0], scope) if call.args else None
+        if method == 'update':
+            reading.own_state_set |= {each.arg for each in call.keywords if each.arg}
+            for node in call.args:
+                keys = node.keys if isinstance(node, ast.Dict) else [None]
+                for key in keys:
+                    if isinstance(key, ast.Constant):
+                        reading.own_state_set.add(str(key.value))
+                    else:
+                        reading.is_own_state_open = True
+        elif method in ('get', 'setdefault', 'pop') and isinstance(named, Texts):
+            if method == 'pop' and len(call.args) == 1:
+                self._read_own_state(call.args[0], scope)
+            reading.own_state_set |= {text for text, _, _ in named.options}
+        elif method in ('get', 'setdefault', 'pop'):
+            reading.is_own_state_open = True
+
+    def _call_attribute(self, function: str, call: ast.Call, scope: Scope) -> bool:
+        """Note what `hasattr(node.state, 'x')` and the like use; return whether that is all."""
+        if len(call.args) < 2:  # noqa: PLR2004 (the object and the name)
+            return False
+        owner, named = (self._names.value_of(each, scope) for each in call.args[:2])
+        texts = [text for text, _, _ in named.options] if isinstance(named, Texts) else None
+        run = self.run
+        match owner:
+            case Chain(path=('node', 'parameters')):
+                run.ask('parameter', named)
+            case Chain(path=('node', 'state')) if texts is not None:
+                run.reading.state_tested |= set(texts)
+                for text in texts if function.endswith('setattr') else ():
+                    run.set_state(text, scope)
+            case Chain(path=('node', 'state')):
+                run.reading.is_state_open = True
+            case _:
+                return False
+        for node in call.args[2:]:
+            self.visit(node, scope)
+        return True
+
+
+def _asks_what_it_is(node: ast.AST) -> bool:
+    """Return whether a part of a test asks for a type, an attribute, or an identity."""
+    match node:
+        case ast.Compare(ops=[ast.Is() | ast.IsNot()], comparators=[other]):
+            return not isinstance(other, ast.Constant)
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+            return name in _TESTS
+        case ast.Attribute(attr=name):
+            return name.startswith('__')
+    return False
+
+
+def _prefix(node: ast.expr, name: str) -> ast.expr:
+    """Return the part of a chain of attributes that ends with a name."""
+    for each in ast.walk(node):
+        if isinstance(each, ast.Attribute) and each.attr == name:
+            return each
+    return node
+
+
+def _tests_in(definition: ast.AST) -> list[ast.AST]:
+    found: list[ast.AST] = []
+    for node in ast.walk(definition):
+        match node:
+            case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
+                found.append(test)
+            case ast.Assert(test=test):
+                found.append(test)
+            case ast.BoolOp(values=values) | ast.comprehension(ifs=values):
+                found += values
+            case ast.Match(subject=subject):
+                found.append(subject)
+    return found
+
+
+def _words(expression: ast.expr | None) -> set[str]:
+    if expression is None:
+        return {'BaseException'}
+    nodes = list(ast.walk(expression))
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+
+
+def _is_guard(handler: ast.ExceptHandler) -> bool:
+    """Return whether a handler expects wrong names: it catches them, or ignores everything."""
+    names = _words(handler.type)
+    does_nothing = all(isinstance(each, _DOING_NOTHING) for each in handler.body)
+    return bool(names & _CATCHING) or (does_nothing and bool(names & _CATCHING_ALL))
+
+
+def _is_broad(handler: ast.ExceptHandler) -> bool:
+    """Return whether a handler catches everything, and goes on."""
+    raises = any(isinstance(node, ast.Raise) for each in handler.body for node in ast.walk(each))
+    return bool(_words(handler.type) & _CATCHING_ALL) and not raises
+
+
+def _gives(definition: ast.AST) -> bool:
+    return isinstance(definition, ast.Lambda) or any(
+        isinstance(node, ast.Return | ast.Yield | ast.YieldFrom) for node in ast.walk(definition)
+    )

@@ -1,2 +1,0 @@
-"""Legs and a body."""
-from . import body, leg

@@ -1,4 +1,0 @@
-from .kinematics import *
-from .callbacks import prepare
-
-__all__ = ['prepare', 'forward', 'LINKS']
