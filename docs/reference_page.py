@@ -149,7 +149,7 @@ def _table(owner: dict[str, Any], schema: dict[str, Any]) -> Iterator[str]:
         yield f'| {" | ".join(_cell(cell) for cell in cells)} |'
     for pattern, value in owner.get('patternProperties', {}).items():
         yield f'| `{pattern.removeprefix("^")}…` | anything |  | {value["description"]} |'
-    for group in [owner, *owner.get('allOf', ())]:
+    for group in [owner, *filter(None, [owner.get('else')]), *owner.get('allOf', ())]:
         for text in _conditions(group):
             yield ''
             yield text

@@ -138,6 +138,8 @@ class PublisherSpec:
 
     Attributes:
         external: Whether its subscriptions are in no file.
+        active: Whether it is there from the start.
+        made_by: `library` if a library creates it; otherwise empty.
         qos_overrides: The policies that ROS parameters can override.
     """
 
@@ -152,6 +154,8 @@ class PublisherSpec:
     on_matched: BehaviourSpec | None
     local_delivery: bool
     external: bool
+    active: bool
+    made_by: str
     path: DataPath
     by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)
 
@@ -168,6 +172,8 @@ class SubscriptionSpec:
         while_inactive: What becomes of messages while the node has a lifecycle and is not active;
             `None` for what fits the durability.
         external: Whether its publishers are in no file.
+        active: Whether it is there from the start.
+        made_by: `library` if a library creates it; otherwise empty.
         qos_overrides: The policies that ROS parameters can override.
         raw: Whether its behaviour gets serialised messages.
         content_filter: The `expression` and the `parameters`; empty for all messages.
@@ -192,6 +198,8 @@ class SubscriptionSpec:
     while_inactive: WhileInactive | None
     on_error: OnError
     external: bool
+    active: bool
+    made_by: str
     warn_after_sec: float | None
     path: DataPath
     by_parameter: Mapping[str, ParameterReference] = field(default_factory=dict)

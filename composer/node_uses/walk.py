@@ -39,7 +39,10 @@ _TESTS = frozenset(
 )
 _ENDS = (ast.Return, ast.Raise, ast.Break, ast.Continue)
 NODE_ATTRIBUTES = frozenset(
-    {'logger', 'name', 'own_state', 'parameters', 'ros', 'state', 'stopping'}
+    {
+        *('logger', 'name', 'own_state', 'parameters', 'publishers', 'ros', 'state', 'stopping'),
+        'subscriptions',
+    }
 )
 LOGGER_NAMES = frozenset(
     {

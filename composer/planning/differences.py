@@ -74,7 +74,7 @@ _PARAMETERS = _Rules(
 )
 _FIXED = {
     **dict.fromkeys(
-        ('type', *_CHANNELS, 'qos', 'qos_overrides', 'raw', 'content_filter'),
+        ('type', *_CHANNELS, 'qos', 'qos_overrides', 'raw', 'content_filter', 'active', 'made_by'),
         'ROS fixes this when it is created',
     ),
     **dict.fromkeys(('group', 'clock'), 'rclpy fixes this when it is created'),

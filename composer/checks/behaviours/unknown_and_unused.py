@@ -191,6 +191,7 @@ def _check_unused(
         names = {(use.kind, use.name) for each in uses for use in each.uses}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
         names |= {('parameter', name) for name in node.followed}
+        names |= {('publisher', each.name) for each in node.publishers.values() if each.made_by}
         names |= set(_meant(node, names))
         mentions = [context.behaviours.mentions(each) for each in uses]
         mentioned = set().union(*(each.names for each in mentions))

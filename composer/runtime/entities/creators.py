@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
+from composer.runtime.entities.absent_ends import AbsentEnd
 from composer.runtime.entities.parameters import NodeParameters
 from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
@@ -22,6 +23,13 @@ if TYPE_CHECKING:
 
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.nodes.live_node import LiveNode
+
+
+def _create_end(create: Callable[[LiveNode, Any], LiveEntity]) -> Callable[..., LiveEntity]:
+    """Return what creates a publisher or subscription if it is there from the start."""
+    return lambda node, spec: (
+        create(node, spec) if spec.active and not spec.made_by else AbsentEnd(node, spec)
+    )
 
 
 # These import `rclpy.action`, and with it NumPy: only for who has actions.
@@ -40,12 +48,12 @@ def _create_action_server(node: LiveNode, spec: Any) -> LiveEntity:
 # By section, in the order of creation: each takes the node and the record of one entity, and
 # is what is kept of it in `LiveNode.entities`.
 CREATORS: dict[str, Callable[[LiveNode, Any], LiveEntity]] = {
-    'publishers': Publisher,
+    'publishers': _create_end(Publisher),
     'service_clients': ServiceClient,
     'action_clients': _create_action_client,
     'services': Service,
     'actions': _create_action_server,
-    'subscriptions': Subscription,
+    'subscriptions': _create_end(Subscription),
     'timers': Timer,
     'sources': Source,
 }

@@ -98,6 +98,22 @@ class Stopping(threading.Event):
         return self.is_set()
 
 
+class End:
+    """A declared publisher or subscription: on the graph while it is active."""
+
+    def __init__(self, creation: EntityCreation, section: str, name: str) -> None:
+        self._creation, self._section, self._name = creation, section, name
+
+    @property
+    def active(self) -> bool:
+        """Whether it is on the graph."""
+        return self._creation.is_active(self._section, self._name)
+
+    @active.setter
+    def active(self, is_active: bool) -> None:
+        self._creation.activate(self._section, self._name, is_active=is_active)
+
+
 class Node:
     """A node, as its behaviours see it.
 
@@ -172,6 +188,19 @@ class Node:
             Whether all of the time has passed; false once the node stops.
         """
         return not self.stopping.wait(seconds)
+
+    @property
+    def publishers(self) -> Mapping[str, End]:
+        """Its declared publishers, by their names in the file."""
+        return self._ends('publishers')
+
+    @property
+    def subscriptions(self) -> Mapping[str, End]:
+        """Its declared subscriptions, by their names in the file."""
+        return self._ends('subscriptions')
+
+    def _ends(self, section: str) -> Mapping[str, End]:
+        return {name: End(self._creation, section, name) for name in self._entities[section]}
 
     def publish(self, name: str, payload: Payload) -> None:
         """Publish on one of the node's declared publishers.

@@ -6,6 +6,7 @@ They belong to their node: one that is created again starts without them, and ed
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -193,6 +194,31 @@ class EntityCreation:
         if section == 'timers' and node.gate.is_open and not node.gate.rests:
             entity.ros.reset()
         return _HANDLES.get(section, CreatedEntity)(section, name, entity)
+
+    def is_active(self, section: str, name: str) -> bool:
+        """Return whether a publisher or subscription is on the graph."""
+        return hasattr(self.node.entities[section][name], 'ros')
+
+    def activate(self, section: str, name: str, *, is_active: bool) -> None:
+        """Have a declared publisher or subscription come to the graph, or leave it.
+
+        Raises:
+            EntityError: A library makes it, or it cannot be created.
+        """
+        node, spec = self.node, getattr(self.node.spec, section)[name]
+        if spec.made_by:
+            message = f"'{name}' is made by a library: whether it is there is for that to say"
+            raise EntityError(message)
+        with self._lock:
+            if self.is_active(section, name) == is_active:
+                return
+            before = node.entities[section][name]
+            try:
+                created = node.system.create_entity(node, section, replace(spec, active=is_active))
+            except StartError as error:
+                raise EntityError(str(error), help=error.help) from error
+            node.entities[section][name] = created
+            before.destroy()
 
     def destroy(self, created: CreatedEntity) -> None:
         """Remove an entity; a second time does nothing."""

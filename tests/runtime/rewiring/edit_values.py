@@ -348,6 +348,11 @@ _OF_HOSTS = (
 _WITH_HOST = ('node', 'process', 'container', 'include', 'worker')
 _ELSEWHERE = 'where all runs on one computer, it changes nothing that runs'
 LEFT_OUT: dict[str, str] = {
+    **{
+        f'{kind}.{key}': 'what is absent has no health: it has a test of its own'
+        for kind in ('publisher', 'subscription')
+        for key in ('active', 'made_by')
+    },
     **{f'{each}.host': _ELSEWHERE for each in _WITH_HOST},
     **dict.fromkeys(('system.hosts', 'system.network', 'defaults.host'), _ELSEWHERE),
     **{f'host.{key}': _ELSEWHERE for key in _OF_HOSTS},
