@@ -10,7 +10,7 @@ from composer.node_uses.names import Names, is_of_project, own_nodes
 from composer.node_uses.reading import Payload, Reading, missing_reading, unknown_reading
 from composer.node_uses.unread_code import Mentions, find_mentions
 from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
-from composer.node_uses.walk import Walk
+from composer.node_uses.walk import TooLongError, Walk
 from composer.node_uses.wires import Wire, wire_of
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.local_names import list_arguments
@@ -100,7 +100,7 @@ class BehaviourReader:
             _Results(walk, function, given, binding, wire).note()
             if len(given) < len(binding.parameters):
                 walk.run.reading.open_all()
-        except RecursionError:
+        except (RecursionError, TooLongError):
             return unknown_reading()
         return walk.run.reading
 

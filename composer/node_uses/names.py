@@ -80,6 +80,7 @@ class Names:
         self._module_names: dict[int, str] = {}
         self._tops: dict[int, TopNames] = {}
         self._stored: dict[int, dict[str, list[_Stored]]] = {}
+        self._members: dict[int, _Members] = {}
         self._steps = 0
 
     def top(self, module: ModuleSource) -> TopNames:
@@ -278,27 +279,29 @@ class Names:
 
     def _attribute_of(self, of: Class, name: str, instance: Instance | None) -> Value | None:
         for each in self.bases_of(of):
-            stored: list[tuple[FunctionNode, ast.expr | None]] = []
-            for statement in each.definition.body:
-                match statement:
-                    case ast.FunctionDef(name=str(own)) | ast.AsyncFunctionDef(name=str(own)):
-                        if own == name:
-                            return _method(each, statement, instance)
-                        stored += _stores_of(statement, name)
-                    case ast.Assign(targets=[ast.Name(id=own)], value=value) if own == name:
-                        is_none = _is_none(value) or self._is_stored(each.module, name)
-                        if not is_none:
-                            return self.value_of(value, Scope(each.module))
-            stored = [(method, value) for method, value in stored if not _is_none(value)]
+            members = self._members_of(each.definition)
+            value = members.assigned.get(name)
+            if name in members.methods:
+                # A class may replace it: `get = classmethod(get)`.
+                method = members.methods[name]
+                return _method(each, method, instance) if value is None else None
+            if value is not None and not self._is_stored(each.module, name):
+                return self.value_of(value, Scope(each.module))
+            stored = members.stored.get(name, [])
             if stored and instance is not None:
                 method, kept = stored[0]
-                if len(stored) > 1 or kept is None or self._is_stored(each.module, name, 1):
+                if len(stored) > 1 or self._is_stored(each.module, name, 1):
                     return None
                 given: dict[str, Value] = dict(instance.given) if method.name == '__init__' else {}
                 own_name = next(list_arguments(method.args), None)
                 given |= {own_name.arg: instance} if own_name else {}
                 return self.value_of(kept, Scope(each.module, method, given))
         return None
+
+    def _members_of(self, definition: ast.ClassDef) -> _Members:
+        if id(definition) not in self._members:
+            self._members[id(definition)] = _Members(definition)
+        return self._members[id(definition)]
 
     def _is_stored(self, module: ModuleSource, name: str, times: int = 0) -> bool:
         """Return whether code may store an attribute more often than that."""
@@ -412,15 +415,30 @@ def _patterns(nodes: list[ast.AST]) -> set[str]:
     }
 
 
-def _stores_of(method: FunctionNode, name: str) -> Iterator[tuple[FunctionNode, ast.expr | None]]:
-    """Yield what a method stores in an attribute of its object."""
-    own_name = next(list_arguments(method.args), None)
-    for node in own_nodes(method):
-        for target, value, _ in _assignments(node):
-            match target:
-                case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
-                    if own_name and owner == own_name.arg and attribute == name:
-                        yield method, value
+class _Members:
+    """The methods of a class, and what its body and its methods assign to its attributes."""
+
+    def __init__(self, definition: ast.ClassDef) -> None:
+        self.methods: dict[str, FunctionNode] = {}
+        self.assigned: dict[str, ast.expr] = {}
+        self.stored: dict[str, list[tuple[FunctionNode, ast.expr]]] = {}
+        for statement in definition.body:
+            match statement:
+                case ast.FunctionDef() | ast.AsyncFunctionDef():
+                    self.methods[statement.name] = statement
+                    self._read(statement)
+                case ast.Assign(targets=[ast.Name(id=name)], value=value) if not _is_none(value):
+                    self.assigned[name] = value
+
+    def _read(self, method: FunctionNode) -> None:
+        first = next(list_arguments(method.args), None)
+        own_name = first.arg if first else ''
+        for node in own_nodes(method):
+            for target, value, _ in _assignments(node):
+                match target:
+                    case ast.Attribute(value=ast.Name(id=owner), attr=name):
+                        if owner == own_name and not _is_none(value):
+                            self.stored.setdefault(name, []).append((method, value))
 
 
 def _method(of: Class, method: FunctionNode, instance: Instance | None) -> Function | None:

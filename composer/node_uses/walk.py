@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 # Longer chains of calls are not followed, and the node that is given to one may do anything.
 _DEEPEST = 5
+# What one behaviour may take: an expression is a step.
+_MOST_STEPS = 30_000
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _TESTS = frozenset(
     {'callable', 'get_fields_and_field_types', 'getattr', 'hasattr', 'isinstance', 'type'}
@@ -98,6 +100,10 @@ _INSTEAD = {
 }
 
 
+class TooLongError(Exception):
+    """A behaviour is too long to be walked through."""
+
+
 class Walk:
     """Notes what one behaviour does.
 
@@ -110,10 +116,9 @@ class Walk:
         self.followed = followed
         self._names = names
         self._depth = 0
+        self._steps = 0
         self._entered: set[object] = set()
         self._asked: dict[int, set[str]] = {}
-        # The names by which the file or the state decides, by function.
-        self._result: set[int] = set()
 
     # Functions
 
@@ -463,7 +468,14 @@ class Walk:
     # Expressions
 
     def visit(self, node: ast.expr, scope: Scope) -> None:
-        """Walk through an expression."""
+        """Walk through an expression.
+
+        Raises:
+            TooLongError: There were too many.
+        """
+        self._steps += 1
+        if self._steps > _MOST_STEPS:
+            raise TooLongError
         match node:
             case ast.Name() | ast.Attribute() | ast.Subscript():
                 self._visit_name(node, scope)
