@@ -44,6 +44,7 @@ ROOMS = (
     'stubs',
     *('export', 'hosts'),
     'application',
+    'page',
     *('cli', 'pytest_plugin', 'api', '__init__', '__main__'),
 )
 # Of these names there are several, which are the same thing in several rooms.

@@ -17,7 +17,6 @@ FORMATS: dict[str, str] = {
     'dot': 'composer.drawing.dot',
     'json': 'composer.drawing.json_document',
     'svg': 'composer.drawing.svg',
-    'html': 'composer.drawing.page',
 }
 _FORMAT_OF_SUFFIX = {
     '': 'mermaid',
@@ -28,8 +27,6 @@ _FORMAT_OF_SUFFIX = {
     '.gv': 'dot',
     '.json': 'json',
     '.svg': 'svg',
-    '.html': 'html',
-    '.htm': 'html',
 }
 DEFAULT_FORMAT = 'mermaid'
 

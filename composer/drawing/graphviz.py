@@ -59,5 +59,5 @@ def _command() -> list[str]:
     if importlib.util.find_spec('pygraphviz'):
         # -P: import nothing from the working folder.
         return [sys.executable, '-P', '-c', _WITH_LIBRARY]
-    message = 'svg and html are laid out by Graphviz, which is not installed'
+    message = 'svg and pages are laid out by Graphviz, which is not installed'
     raise DrawingError(message, help=_MISSING_HELP)

@@ -345,8 +345,8 @@ def test_the_same_file_gives_the_same_text(draw, format_name):
 
 
 def test_the_ending_of_a_file_tells_the_form():
-    endings = ['.svg', '.HTML', '.gv', '.dot', '.json', '.mmd', '.txt', '', '.pdf']
+    endings = ['.SVG', '.html', '.gv', '.dot', '.json', '.mmd', '.txt', '', '.pdf']
     assert [format_of(ending) for ending in endings] == [
-        *('svg', 'html', 'dot', 'dot', 'json', 'mermaid', 'mermaid', 'mermaid', None)
+        *('svg', None, 'dot', 'dot', 'json', 'mermaid', 'mermaid', 'mermaid', None)
     ]
     assert set(map(format_of, endings)) == {*FORMATS, None}

@@ -15,6 +15,7 @@ import click
 
 from composer.application.running_systems.client import Client
 from composer.errors import ComposerError, ExitCode, UsageError
+from composer.interfaces.plain_messages import plain_message
 from composer.names import count_of
 from composer.signals import asked_to_stop
 from composer.spelling import suggest
@@ -22,7 +23,7 @@ from composer.yaml_text.reader import parse_document
 from composer.yaml_text.writer import COMPOSER, render_scalar, render_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from rclpy.node import Node
     from rclpy.task import Future
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 _POLL_SEC = 0.05
 # The rate is told so often.
 _REPORT_SEC = 1.0
-_MOST_ITEMS = 128
 _COMPLETION_SEC = 0.7
 # An array is one line.
 _DIALECT = replace(COMPOSER, has_expressions=False, widest_line=math.inf)
@@ -370,24 +370,10 @@ def _pick(message: Any, field: str, *, is_checked: bool = False) -> Any:
 
 def _show(value: Any, *, is_document: bool = True) -> None:
     """Print a message, or a part of one."""
-    data = _plain(value)
+    data = plain_message(value)
     if isinstance(data, dict | list) and data:
         click.echo(render_yaml(data, _DIALECT), nl=False)
     else:
         click.echo(render_scalar(data, _DIALECT) if data != {} else '{}')
     if is_document:
         click.echo('---')
-
-
-def _plain(value: Any) -> Any:
-    """Return a message as YAML has it; of long arrays only the beginning."""
-    if hasattr(value, 'get_fields_and_field_types'):
-        return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if isinstance(value, bytes):
-        return value[0] if len(value) == 1 else list(value)
-    if isinstance(value, str | bool | int | float):
-        return value
-    items: Sequence[Any] = value[:_MOST_ITEMS]
-    items = items.tolist() if hasattr(items, 'tolist') else items
-    more = [f'… {len(value) - len(items)} more'] if len(value) > len(items) else []
-    return [*map(_plain, items), *more]

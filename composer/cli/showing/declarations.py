@@ -12,7 +12,9 @@ from composer.cli.common.argument_types import (
     refuse_together,
     split_words,
     takes_format,
+    takes_settings,
     takes_system,
+    takes_words,
 )
 from composer.drawing import FORMATS as PICTURE_FORMATS
 
@@ -64,6 +66,33 @@ def show_command(
     return show(paths, arguments, set_values, format_name=format_name, origins=origin)
 
 
+@click.command('page', context_settings=NUMBERS_ARE_VALUES)
+@takes_words('[SYSTEM | [PACKAGE] FILE [LAYER]... [NAME:=VALUE]...]')
+@takes_settings
+@click.option(
+    '--port', type=click.IntRange(0, 65535), default=0, help='Default: one that is free.'
+)
+@click.option(
+    '--listen', default='127.0.0.1', metavar='ADDRESS', help='Only this computer may be.'
+)
+@click.option('--no-browser', 'opens', flag_value=False, default=True, help='Only print it.')
+def page_command(
+    words: tuple[str, ...], set_values: tuple[str, ...], *, port: int, listen: str, opens: bool
+) -> int:
+    """Serve a page of the running SYSTEM, or of a FILE.
+
+    The page shows what is wrong, the graph, the nodes with their figures, parameters and log, and
+    the text of the file. If only one system runs, it need not be named. The page only shows, and
+    only this computer can open it, by the address that is printed.
+    """
+    from composer.page.serve import serve
+
+    is_name = len(words) == 1 and not set_values and not words[0].endswith(('.yaml', '.yml'))
+    paths, arguments = ([], []) if is_name or not words else split_words(words)
+    name = words[0] if is_name else None
+    return serve(name, paths, arguments, set_values, port=port, listen=listen, opens=opens)
+
+
 @click.command('graph', context_settings=NUMBERS_ARE_VALUES)
 @takes_system
 @click.option(
@@ -87,8 +116,8 @@ def graph_command(
 ) -> int:
     """Draw the graph of nodes, topics, services and actions.
 
-    Shows types, QoS that is not the default, and what `composer check` finds. svg and html need
-    Graphviz: the program, or the extra 'graph'. Takes LAYER and NAME:=VALUE as `composer up` does.
+    Shows types, QoS that is not the default, and what `composer check` finds. svg needs Graphviz:
+    the program, or the extra 'graph'. Takes LAYER and NAME:=VALUE as `composer up` does.
     """
     from composer.cli.showing.graph import graph
 
@@ -133,4 +162,4 @@ def stubs_command(words: tuple[str, ...], set_values: tuple[str, ...], output: P
     return write_stubs(read_words(words), set_values, output)
 
 
-COMMANDS = (show_command, graph_command, schema_command, stubs_command)
+COMMANDS = (show_command, page_command, graph_command, schema_command, stubs_command)

@@ -90,7 +90,7 @@ def test_without_graphviz_it_ends_with_1_and_mermaid_still_works(robot, capsys, 
     words = ['graph', 'robot.yaml', 'name:=arm', '--format']
     assert run([*words, 'svg']) == 1
     assert capsys.readouterr().err == (
-        'error: svg and html are laid out by Graphviz, which is not installed\n'
+        'error: svg and pages are laid out by Graphviz, which is not installed\n'
         "  help: install it (pip install 'rclpy-composer[graph]', or Graphviz, the package graphviz"
         ' of your system); mermaid, dot and json need none\n'
     )

@@ -1,18 +1,9 @@
-"""A picture as one HTML page that needs no other file: it can be moved, zoomed and searched.
-
-The page holds the drawing as SVG, the data as JSON, and `page.css` and `page.js` of this package.
-A Content-Security-Policy lets it run this script only, and load nothing.
-"""
+"""What a page shows of a drawn system: the drawing, and facts, text and findings of each part."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import html
-import json
 import re
 from collections import defaultdict
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from composer.checks.placement.crossings import describe_place
@@ -33,47 +24,26 @@ if TYPE_CHECKING:
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
 # Of a topic with many ends, the lines of the first ones.
 _MOST_ENDS = 6
-_PLACEHOLDER = re.compile('@([a-z_]+)@')
 
 
-def render_picture(picture: Picture) -> str:
-    """Return a picture as an HTML page.
+def describe_drawing(picture: Picture) -> dict[str, Any]:
+    """Return a picture as the page takes it: its SVG, and its parts by their tokens.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
     """
-    style, script = _asset('page.css'), _asset('page.js')
-    texts = {
-        'title': html.escape(picture.name),
-        'description': html.escape(picture.description),
-        'style': style,
-        'style_hash': _hash(style),
-        'script': script,
-        'script_hash': _hash(script),
-        'drawing': _inlined(svg.render_picture(picture)),
-        'system': _json(_describe(picture)),
+    return {
+        'name': picture.name,
+        'description': picture.description,
+        'svg': _inlined(svg.render_picture(picture)),
+        **_describe(picture),
     }
-    return _PLACEHOLDER.sub(lambda match: texts[match[1]], _asset('page.html'))
-
-
-def _asset(name: str) -> str:
-    return resources.files('composer.drawing').joinpath(name).read_text(encoding='utf-8')
-
-
-def _hash(text: str) -> str:
-    digest = hashlib.sha256(text.encode()).digest()
-    return f'sha256-{base64.b64encode(digest).decode()}'
 
 
 def _inlined(document: str) -> str:
-    """Return an SVG document as an element of HTML, which needs no namespaces."""
-    return _OPENING.sub(r'<svg viewBox="\1" role="group">', document, count=1).rstrip()
-
-
-def _json(data: Any) -> str:
-    """Return data as JSON that no parser of HTML takes for markup."""
-    text = json.dumps(data, separators=(',', ':'))
-    return text.replace('<', '\\u003c').replace('>', '\\u003e').replace('&', '\\u0026')
+    """Return an SVG document as one element, of the size of its place."""
+    opening = r'<svg xmlns="http://www.w3.org/2000/svg" viewBox="\1" role="group">'
+    return _OPENING.sub(opening, document, count=1).rstrip()
 
 
 def _describe(picture: Picture) -> dict[str, Any]:
@@ -127,7 +97,7 @@ def _part(
     excerpts: list[Excerpt],
 ) -> dict[str, Any]:
     shown = [{'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts]
-    return {**words, 'findings': part.findings, 'near': near, 'excerpts': shown}
+    return {'id': part.id, **words, 'findings': part.findings, 'near': near, 'excerpts': shown}
 
 
 def _describe_node(node: NodeBox) -> dict[str, Any]:

@@ -1,0 +1,555 @@
+'use strict';
+// Everything shown comes from the data of the page, and is set as text, never as markup.
+const stage = document.getElementById('stage');
+const search = document.getElementById('search');
+const MOST_MATCHES = 200;
+const MOST_LINES = 300;
+const MOST_POINTS = 60;
+const byId = (id) => document.getElementById(id);
+
+// What is shown: the drawing with its parts by token, and the latest state.
+let svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+let parts = new Map();
+let findings = [];
+let state = {};
+let heard = 0;
+let drawn = 0;
+const tokens = new Map();
+const rates = new Map();
+
+// The view: a rectangle of the drawing, moved and resized by its viewBox.
+let all = {x: 0, y: 0, width: 1, height: 1};
+let view = {...all};
+
+function show(next) {
+  view = next;
+  svg.setAttribute('viewBox', `${view.x} ${view.y} ${view.width} ${view.height}`);
+}
+
+// Returns the least rectangle of the stage's proportions around another one.
+function shaped(box) {
+  const stretch = stage.clientWidth / Math.max(stage.clientHeight, 1);
+  const width = Math.max(box.width, box.height * stretch);
+  const height = width / stretch;
+  return {
+    x: box.x - (width - box.width) / 2, y: box.y - (height - box.height) / 2, width, height,
+  };
+}
+
+function fit() {
+  const margin = all.width * 0.02;
+  show(shaped({
+    x: all.x - margin, y: all.y - margin, width: all.width + 2 * margin,
+    height: all.height + 2 * margin,
+  }));
+}
+
+// Zooms around a point, given in parts of the stage's width and height.
+function zoom(factor, across = 0.5, down = 0.5) {
+  const width = Math.min(Math.max(view.width * factor, 40), all.width * 20 + 2000);
+  const height = width * view.height / view.width;
+  show({
+    x: view.x + (view.width - width) * across, y: view.y + (view.height - height) * down,
+    width, height,
+  });
+}
+
+function move(across, down) {
+  show({...view, x: view.x + view.width * across, y: view.y + view.height * down});
+}
+
+// Moves a part of the drawing to the middle, large enough to read.
+function bringIn(element) {
+  const seen = element.getBoundingClientRect();
+  const frame = stage.getBoundingClientRect();
+  const scale = view.width / Math.max(frame.width, 1);
+  const x = view.x + (seen.left + seen.width / 2 - frame.left) * scale;
+  const y = view.y + (seen.top + seen.height / 2 - frame.top) * scale;
+  const width = Math.min(view.width, Math.max(frame.width * 0.9, seen.width * scale * 1.2));
+  const height = width * view.height / view.width;
+  show({x: x - width / 2, y: y - height / 2, width, height});
+}
+
+function isInView(element) {
+  const seen = element.getBoundingClientRect();
+  const frame = stage.getBoundingClientRect();
+  return seen.left >= frame.left && seen.right <= frame.right
+    && seen.top >= frame.top && seen.bottom <= frame.bottom;
+}
+
+// The panel.
+function make(tag, text = '', className = '') {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  if (className) element.className = className;
+  return element;
+}
+
+function makeLink(token, text) {
+  const button = make('button', text);
+  button.type = 'button';
+  button.dataset.token = token;
+  button.addEventListener('click', () => choose(token, true));
+  const item = make('li');
+  item.append(button);
+  return item;
+}
+
+function makeExcerpt(excerpt) {
+  const block = document.createDocumentFragment();
+  block.append(make('p', `${excerpt.file}:${excerpt.first}`, 'place'));
+  const text = make('pre');
+  const width = String(excerpt.first + excerpt.lines.length - 1).length;
+  excerpt.lines.forEach((line, index) => {
+    text.append(make('span', `${String(excerpt.first + index).padStart(width)}  `, 'number'));
+    text.append(`${line}\n`);
+  });
+  block.append(text);
+  return block;
+}
+
+function makeFinding(finding) {
+  const text = make('p', '', finding.severity);
+  text.append(make('b', finding.severity), ` ${finding.rule}: ${finding.message}`);
+  if (finding.help) text.append(make('br'), make('span', `help: ${finding.help}`, 'kind'));
+  return text;
+}
+
+function describe(token) {
+  const part = parts.get(token);
+  const details = document.getElementById('details');
+  details.replaceChildren();
+  if (!part) return;
+  const heading = make('h2', part.name);
+  heading.append(' ', make('span', part.kind, 'kind'));
+  details.append(heading);
+  for (const fact of part.facts) details.append(make('p', fact));
+  for (const index of part.findings) details.append(makeFinding(findings[index]));
+  for (const excerpt of part.excerpts) details.append(makeExcerpt(excerpt));
+  if (part.near.length) {
+    const list = make('ul');
+    for (const near of part.near) {
+      // From a node past its publisher, say, to the topic.
+      const far = near[0] === 'e' ? parts.get(near).near.find((each) => each !== token) : near;
+      list.append(makeLink(far, `${parts.get(near).kind} ${parts.get(far).name}`));
+    }
+    details.append(make('h2', 'Connected'), list);
+  }
+}
+
+// Selection, by pointer, keyboard, list or address.
+const shapeOf = (token) => document.getElementById(token);
+let chosen = null;
+
+function choose(token, mustBeSeen) {
+  for (const element of svg.querySelectorAll('.chosen, .near')) {
+    element.classList.remove('chosen', 'near');
+  }
+  chosen = parts.has(token) ? token : null;
+  svg.classList.toggle('choosing', chosen !== null);
+  history.replaceState(null, '', chosen === null ? ' ' : `#${encodeURIComponent(parts.get(chosen).id)}`);
+  describe(chosen);
+  showLive();
+  askParameters();
+  offerMessage();
+  showLog();
+  if (chosen === null) return;
+  shapeOf(token).classList.add('chosen', 'near');
+  for (const near of parts.get(token).near) {
+    shapeOf(near).classList.add('near');
+    for (const far of parts.get(near).near) if (near[0] === 'e') shapeOf(far).classList.add('near');
+  }
+  if (mustBeSeen) bringIn(shapeOf(token));
+}
+
+function makeSelectable(token, part) {
+  const element = shapeOf(token);
+  element.classList.add('known');
+  if (token[0] === 'e') {
+    const reach = element.querySelector('path').cloneNode();
+    reach.setAttribute('class', 'reach');
+    element.append(reach);
+  } else {
+    element.setAttribute('tabindex', '0');
+    element.setAttribute('role', 'button');
+    element.setAttribute('aria-label', `${part.kind} ${part.name}`);
+    element.addEventListener('focus', () => { if (!isInView(element)) bringIn(element); });
+  }
+  element.addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter' && event.key !== ' ') return;
+    event.preventDefault();
+    choose(token, false);
+  });
+}
+
+// The pointer: drag to move, click to select, turn the wheel to zoom.
+let drag = null;
+stage.addEventListener('pointerdown', (event) => {
+  if (event.button !== 0) return;
+  drag = {x: event.clientX, y: event.clientY, view, moved: false};
+});
+stage.addEventListener('pointermove', (event) => {
+  if (!drag) return;
+  const across = event.clientX - drag.x;
+  const down = event.clientY - drag.y;
+  if (!drag.moved && Math.hypot(across, down) < 4) return;
+  if (!drag.moved) stage.setPointerCapture(event.pointerId);
+  drag.moved = true;
+  const scale = drag.view.width / Math.max(stage.clientWidth, 1);
+  show({...drag.view, x: drag.view.x - across * scale, y: drag.view.y - down * scale});
+});
+stage.addEventListener('pointerup', (event) => {
+  if (drag && !drag.moved) choose(event.target.closest('.known')?.id, false);
+  drag = null;
+});
+stage.addEventListener('pointercancel', () => { drag = null; });
+stage.addEventListener('wheel', (event) => {
+  event.preventDefault();
+  const frame = stage.getBoundingClientRect();
+  const steps = event.deltaY * (event.deltaMode === 1 ? 30 : 1);
+  zoom(
+    1.002 ** Math.max(-300, Math.min(300, steps)),
+    (event.clientX - frame.left) / frame.width, (event.clientY - frame.top) / frame.height,
+  );
+}, {passive: false});
+
+const KEYS = {
+  ArrowLeft: () => move(-0.1, 0), ArrowRight: () => move(0.1, 0),
+  ArrowUp: () => move(0, -0.1), ArrowDown: () => move(0, 0.1),
+  '+': () => zoom(0.8), '=': () => zoom(0.8), '-': () => zoom(1.25), 0: fit,
+};
+stage.addEventListener('keydown', (event) => {
+  if (!(event.key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  KEYS[event.key]();
+});
+document.addEventListener('keydown', (event) => {
+  if (event.key === '/' && document.activeElement !== search) {
+    event.preventDefault();
+    search.focus();
+  } else if (event.key === 'Escape') {
+    search.value = '';
+    find();
+    choose(null, false);
+  }
+});
+document.getElementById('zoom-in').addEventListener('click', () => zoom(0.8));
+document.getElementById('zoom-out').addEventListener('click', () => zoom(1.25));
+document.getElementById('fit').addEventListener('click', fit);
+
+// The search: each word must be in the kind, the name or the facts.
+function find() {
+  const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+  const found = [];
+  for (const [token, part] of parts) {
+    const text = [part.kind, part.name, ...part.facts].join('\n').toLowerCase();
+    const matches = words.length > 0 && words.every((word) => text.includes(word));
+    shapeOf(token).classList.toggle('match', matches);
+    if (matches && token[0] !== 'e') found.push(token);
+  }
+  svg.classList.toggle('searching', words.length > 0);
+  byId('count').textContent = words.length ? `${found.length} found` : '';
+  byId('found').hidden = words.length === 0;
+  document.getElementById('matches').replaceChildren(...found.slice(0, MOST_MATCHES).map(
+    (token) => makeLink(token, `${parts.get(token).kind} ${parts.get(token).name}`),
+  ));
+  return found;
+}
+search.addEventListener('input', find);
+search.addEventListener('keydown', (event) => {
+  if (event.key !== 'Enter') return;
+  // Enter goes from one match to the next.
+  const found = find();
+  if (found.length) choose(found[(found.indexOf(chosen) + 1) % found.length], true);
+});
+
+// The drawing, anew when the plan has changed; the selection stays.
+async function get(path) {
+  const answer = await fetch(path, {headers: {accept: 'application/json'}});
+  return answer.json();
+}
+
+async function draw() {
+  const drawing = await get('api/drawing');
+  const before = chosen === null ? decodeURIComponent(location.hash.slice(1)) : parts.get(chosen).id;
+  parts = new Map(Object.entries(drawing.parts ?? {}));
+  findings = drawing.findings ?? [];
+  tokens.clear();
+  for (const [token, part] of parts) tokens.set(part.id, token);
+  if (drawing.svg) {
+    const made = new DOMParser().parseFromString(drawing.svg, 'image/svg+xml').documentElement;
+    const box = made.viewBox.baseVal;
+    const isNew = parts.size > 0 && all.width !== box.width;
+    all = {x: box.x, y: box.y, width: box.width, height: box.height};
+    svg = document.importNode(made, true);
+    stage.replaceChildren(svg);
+    if (isNew) fit(); else show(view);
+  } else {
+    stage.replaceChildren(make('p', state.drawing_problem || 'There is no drawing.', 'kind'));
+  }
+  for (const [token, part] of parts) makeSelectable(token, part);
+  find();
+  showTree();
+  choose(tokens.get(before), false);
+  mark();
+}
+
+// The state.
+const LEVELS = ['ok', 'warn', 'stale', 'error'];
+const worse = (one, other) => (LEVELS.indexOf(one) > LEVELS.indexOf(other) ? one : other);
+const keyOf = (row) => `${row.kind}:${row.node}:${row.name}`;
+const rows = () => state.health?.entities ?? [];
+
+function levelOf(row) {
+  const level = row.level ?? 'ok';
+  return row.errors > 0 || row.dropped > 0 ? worse(level, 'warn') : level;
+}
+
+function levelsOfNodes() {
+  const levels = new Map();
+  for (const row of rows()) levels.set(row.node, worse(levelOf(row), levels.get(row.node) ?? 'ok'));
+  for (const [node, lifecycle] of Object.entries(state.status?.lifecycles ?? {})) {
+    if (lifecycle !== 'active') levels.set(node, worse('warn', levels.get(node) ?? 'ok'));
+  }
+  return levels;
+}
+
+// Shows the levels in the drawing: classes alone, the layout stays.
+function mark() {
+  const levels = levelsOfNodes();
+  const runs = new Set(state.status?.nodes ?? []);
+  const drops = new Set(rows().filter((row) => levelOf(row) !== 'ok').map(keyOf));
+  for (const [token, part] of parts) {
+    const element = shapeOf(token);
+    if (!element) continue;
+    const name = part.id.slice(part.id.indexOf(':') + 1);
+    const isNode = part.kind === 'node';
+    const level = isNode ? levels.get(name) ?? 'ok' : 'ok';
+    element.classList.toggle('hurts', isNode ? level === 'error' : drops.has(part.id));
+    element.classList.toggle('warns', isNode && (level === 'warn' || level === 'stale'));
+    element.classList.toggle('absent', isNode && state.runs === true && !runs.has(name));
+  }
+}
+
+// Items stay as they are while they are about the same: who is about to click, or has the focus,
+// keeps them. Only what they say changes.
+function showItems(list, items) {
+  const keys = JSON.stringify(items.map(({level, part}) => [level, part, tokens.get(part)]));
+  if (list.dataset.keys !== keys) {
+    list.dataset.keys = keys;
+    list.replaceChildren(...items.map(({level, part}) => {
+      const token = tokens.get(part);
+      const item = token ? makeLink(token, '') : make('li');
+      const line = make('span', '', level);
+      line.append(make('b', level), ' ', make('span'));
+      (item.firstChild ?? item).append(line);
+      return item;
+    }));
+  }
+  items.forEach(({text}, index) => {
+    const place = list.children[index].querySelector('b + span');
+    if (place.textContent !== text) place.textContent = text;
+  });
+}
+
+function showProblems() {
+  const items = (state.problems ?? []).map(({level, text, node}) => ({level, text, part: `node:${node}`}));
+  if (state.problem) items.unshift({level: 'error', text: state.problem, part: ''});
+  if (state.drawing_problem) items.push({level: 'warn', text: state.drawing_problem, part: ''});
+  for (const finding of findings) {
+    const place = finding.line ? `${finding.file}:${finding.line}` : finding.file;
+    const part = parts.get(finding.part)?.id ?? '';
+    items.push({level: finding.severity, text: `${finding.message} (${place})`, part});
+  }
+  byId('none').hidden = items.length > 0;
+  showItems(byId('problems'), items);
+}
+
+function showTree() {
+  const levels = levelsOfNodes();
+  const {nodes: running, lifecycles} = state.status ?? {};
+  const shown = JSON.stringify([drawn, [...levels].sort(), running, lifecycles, parts.size]);
+  if (byId('tree').dataset.shown === shown) return;
+  byId('tree').dataset.shown = shown;
+  const drawnNodes = [...parts.values()].filter((part) => part.id.startsWith('node:'))
+    .map((part) => part.id.slice(5));
+  const nodes = new Set([...drawnNodes, ...(state.status?.nodes ?? [])]);
+  const groups = new Map();
+  for (const node of [...nodes].sort()) {
+    const space = node.slice(0, node.lastIndexOf('/')) || '/';
+    groups.set(space, [...(groups.get(space) ?? []), node]);
+  }
+  const open = new Set([...document.querySelectorAll('#tree details:not([open])')]
+    .map((each) => each.dataset.space));
+  byId('tree').replaceChildren(...[...groups].map(([space, members]) => {
+    const fold = make('details');
+    fold.dataset.space = space;
+    fold.open = !open.has(space);
+    const worst = members.reduce((level, each) => worse(levels.get(each) ?? 'ok', level), 'ok');
+    fold.append(make('summary', `${space} (${members.length})`, worst));
+    const list = make('ul');
+    for (const node of members) {
+      const lifecycle = state.status?.lifecycles?.[node];
+      const text = node.slice(node.lastIndexOf('/') + 1) + (lifecycle ? ` (${lifecycle})` : '');
+      const token = tokens.get(`node:${node}`);
+      const item = token ? makeLink(token, text) : make('li', text);
+      item.classList.add(levels.get(node) ?? 'ok');
+      list.append(item);
+    }
+    fold.append(list);
+    const item = make('li');
+    item.append(fold);
+    return item;
+  }));
+}
+
+const number = (value, digits = 1) => (typeof value === 'number' ? value.toFixed(digits) : '–');
+
+function sparkline(points) {
+  const line = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+  const most = Math.max(...points, 1e-9);
+  const path = document.createElementNS('http://www.w3.org/2000/svg', 'path');
+  path.setAttribute('d', points.map((each, index) => (
+    `${index ? 'L' : 'M'}${index * 60 / MOST_POINTS} ${15 - 14 * each / most}`)).join(''));
+  line.setAttribute('viewBox', '0 0 60 16');
+  line.setAttribute('class', 'spark');
+  line.setAttribute('aria-hidden', 'true');
+  line.append(path);
+  return line;
+}
+
+// The entities of the chosen node, topic or end, with their figures.
+function chosenRows() {
+  const part = parts.get(chosen);
+  if (!part) return [];
+  if (part.id.startsWith('node:')) return rows().filter((row) => `node:${row.node}` === part.id);
+  const ids = new Set([part.id, ...part.near.map((token) => parts.get(token)?.id)]);
+  return rows().filter((row) => ids.has(keyOf(row)));
+}
+
+function showLive() {
+  const found = chosenRows();
+  const live = byId('live');
+  if (!found.length) { live.replaceChildren(); return; }
+  const table = make('table');
+  const titles = ['', 'Hz', '', 'mean ms', 'p99 ms', 'core %', 'queue', 'drops', 'late', 'errors'];
+  const header = make('tr');
+  for (const title of titles) header.append(make('th', title));
+  table.append(header);
+  for (const row of found) {
+    const line = make('tr', '', levelOf(row));
+    const name = make('td', `${row.kind} ${row.name}`);
+    const way = [row.delivery, row.delivery_reason].filter(Boolean).join(', ');
+    if (way) name.append(make('br'), make('span', way, 'kind'));
+    if (levelOf(row) !== 'ok' && row.message) name.append(make('br'), make('span', row.message));
+    const spark = make('td');
+    spark.append(sparkline(rates.get(keyOf(row)) ?? []));
+    line.append(name, make('td', number(row.rate_hz)), spark);
+    const cells = [number(row.mean_ms, 2), number(row.p99_ms, 2),
+      row.cpu === null ? '–' : number(100 * row.cpu), number(row.queued, 0), number(row.dropped, 0),
+      number(row.late, 0), number(row.errors, 0)];
+    for (const cell of cells) line.append(make('td', cell));
+    table.append(line);
+  }
+  live.replaceChildren(make('h2', 'Now'), table);
+}
+
+async function askParameters() {
+  const section = byId('parameters');
+  section.replaceChildren();
+  const part = parts.get(chosen);
+  if (!state.runs || !part?.id.startsWith('node:')) return;
+  const asked = chosen;
+  const found = await get(`api/parameters?node=${encodeURIComponent(part.id.slice(5))}`);
+  if (chosen !== asked) return;
+  if (!Array.isArray(found)) { section.append(make('p', found.problem, 'kind')); return; }
+  const list = make('dl');
+  for (const each of found) {
+    const about = [each.range ? `${each.range[0]} to ${each.range[1]}` : '',
+      each.read_only ? 'read-only' : '', each.description].filter(Boolean).join(', ');
+    list.append(make('dt', each.name), make('dd', `${JSON.stringify(each.value)}  ${about}`));
+  }
+  section.append(make('h2', 'Parameters'), list);
+}
+
+// A message of the chosen topic, when somebody asks for one.
+function offerMessage() {
+  const section = byId('message');
+  section.replaceChildren();
+  const part = parts.get(chosen);
+  if (!state.runs || part?.kind !== 'topic') return;
+  const button = make('button', 'Look at a message');
+  button.type = 'button';
+  button.addEventListener('click', async () => {
+    const found = await get(`api/message?topic=${encodeURIComponent(part.name)}`);
+    section.replaceChildren(make('h2', 'Message'), button, make('pre', found.text ?? found.problem));
+  });
+  section.append(make('h2', 'Message'), button);
+}
+
+// The log: all of it, or that of the chosen node.
+const lines = [];
+
+async function fetchLog() {
+  const last = lines.length ? lines[lines.length - 1].number : 0;
+  const more = await get(`api/log?after=${last}`);
+  if (!more.length) return;
+  lines.push(...more);
+  lines.splice(0, Math.max(0, lines.length - MOST_LINES));
+  showLog();
+}
+
+function showLog() {
+  const part = parts.get(chosen);
+  const name = part?.id.startsWith('node:') ? part.id.slice(6).replaceAll('/', '.') : null;
+  const shown = lines.filter((line) => name === null || line.name === name);
+  byId('log').replaceChildren(...shown.slice(-MOST_LINES).reverse().map((line) => {
+    const level = {warn: 'warn', error: 'error', fatal: 'error'}[line.level] ?? 'ok';
+    const item = make('li', '', level);
+    const time = new Date(line.time * 1000).toTimeString().slice(0, 8);
+    item.append(make('span', `${time} ${line.name} `, 'place'), line.text);
+    return item;
+  }));
+}
+
+function showSummary() {
+  byId('name').textContent = state.name || 'Composer';
+  document.title = `${(state.problems ?? []).length ? '● ' : ''}${state.name || 'Composer'}`;
+  const period = state.health?.period_sec ?? 1;
+  const age = (Date.now() - heard) / 1000;
+  const isOld = state.runs && age > 2 * period + 1;
+  document.body.classList.toggle('old', isOld || !state.runs);
+  const status = state.status;
+  const cpu = (state.health?.processes ?? []).reduce((sum, each) => sum + (each.cpu ?? 0), 0);
+  byId('summary').textContent = status
+    ? `${isOld ? `last heard ${age.toFixed(0)} s ago` : state.runs ? status.state : 'gone'}, `
+      + `${status.nodes.length} nodes, ${(100 * cpu).toFixed(0)} % of a core, ${status.host}, `
+      + `process ${status.pid}, ${status.file}`
+    : state.problem || 'a file: nothing runs';
+}
+
+function take(next) {
+  state = next;
+  heard = Date.now();
+  for (const row of rows()) {
+    const key = keyOf(row);
+    rates.set(key, [...(rates.get(key) ?? []), row.rate_hz ?? 0].slice(-MOST_POINTS));
+  }
+  if (state.drawing !== drawn) {
+    drawn = state.drawing;
+    draw().then(showProblems);
+  }
+  mark();
+  showSummary();
+  showProblems();
+  showTree();
+  showLive();
+  if (state.runs) fetchLog();
+}
+
+window.addEventListener('resize', () => show(shaped(view)));
+window.addEventListener('hashchange', () => choose(tokens.get(decodeURIComponent(location.hash.slice(1))), true));
+setInterval(showSummary, 1000);
+const events = new EventSource('api/events');
+events.addEventListener('message', (event) => take(JSON.parse(event.data)));
+events.addEventListener('error', () => { heard = Math.min(heard, Date.now() - 1e4); showSummary(); });

@@ -1,0 +1,298 @@
+"""The HTTP server of the page: loopback only, with a secret, and read-only."""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import math
+import secrets
+import socket
+from concurrent.futures import Future
+from contextlib import suppress
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError
+from composer.page.looks import list_parameters, look_at_message
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, MutableMapping
+    from typing import TypeAlias
+
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+    from composer.application.running_systems.client import Client
+    from composer.page.watched_system import DrawnFiles, WatchedSystem
+
+    Scope: TypeAlias = MutableMapping[str, Any]
+    Receive: TypeAlias = Callable[[], Awaitable[Scope]]
+    Send: TypeAlias = Callable[[Scope], Awaitable[None]]
+    Application: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+_HEADERS = {
+    'cache-control': 'no-store',
+    'content-security-policy': (
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    'cross-origin-opener-policy': 'same-origin',
+    'cross-origin-resource-policy': 'same-origin',
+    'referrer-policy': 'no-referrer',
+    'x-content-type-options': 'nosniff',
+}
+_MOST_STREAMS = 16
+# A browser that does not read so long is dropped.
+_SEND_SEC = 10.0
+_KEEP_ALIVE_SEC = 15.0
+# States come no faster than they can be looked at.
+_SHORTEST_PAUSE_SEC = 0.25
+_ANSWER_SEC = 12.0
+_ASSETS = {'page.css': 'text/css', 'page.js': 'text/javascript'}
+
+
+class PageServer:
+    """Serves what a source knows.
+
+    Args:
+        source: Where the page is from.
+        port: 0 for any that is free.
+
+    Raises:
+        ComposerError: The port is taken, or the extra `page` is missing.
+
+    Attributes:
+        address: With the secret, which is good for one browser after the other.
+    """
+
+    def __init__(self, source: DrawnFiles | WatchedSystem, port: int) -> None:
+        try:
+            import starlette  # noqa: F401 - asked for at once
+            import uvicorn
+        except ImportError as error:
+            message = f'the page needs {error.name}, which is not installed'
+            raise ComposerError(message, help="pip install 'rclpy-composer[page]'") from error
+        self._uvicorn = uvicorn
+        self._source = source
+        self._secret = secrets.token_urlsafe(32)
+        self._streams = 0
+        self._wakers: set[asyncio.Event] = set()
+        self._socket = socket.socket()
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._socket.bind(('127.0.0.1', port))
+            # Who opens the address at once is served once all is ready.
+            self._socket.listen(4 * _MOST_STREAMS)
+        except OSError as error:
+            message = f'port {port} cannot be used: {error.strerror}'
+            raise ComposerError(message, help='choose another one with --port') from error
+        self.port: int = self._socket.getsockname()[1]
+        # Cookies do not tell ports apart.
+        self._cookie = f'composer_page_{self.port}'
+        self._hosts = {f'{name}:{self.port}' for name in ('127.0.0.1', 'localhost')}
+        self.address = f'http://127.0.0.1:{self.port}/?token={self._secret}'
+
+    def run(self) -> None:
+        """Serve until a signal comes."""
+        config = self._uvicorn.Config(
+            self._guarded(self._routes()),
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            date_header=False,
+            timeout_graceful_shutdown=1,
+            limit_concurrency=4 * _MOST_STREAMS,
+            lifespan='off',
+        )
+        server = self._uvicorn.Server(config)
+        self._source.start()
+        try:
+            asyncio.run(self._serve(server))
+        finally:
+            self._source.stop()
+
+    async def _serve(self, server: Any) -> None:
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            for each in self._wakers:
+                each.set()
+
+        def tell() -> None:
+            with suppress(RuntimeError):  # The loop has ended.
+                loop.call_soon_threadsafe(wake)
+
+        self._source.changed = tell
+        await server.serve(sockets=[self._socket])
+
+    def _routes(self) -> Application:
+        from starlette.applications import Starlette
+        from starlette.routing import Route
+
+        return Starlette(
+            routes=[
+                Route('/', self._page),
+                Route('/api/state', self._state),
+                Route('/api/drawing', self._drawing),
+                Route('/api/log', self._log),
+                Route('/api/parameters', self._parameters),
+                Route('/api/message', self._message),
+                Route('/{name}', self._asset),
+            ]
+        )
+
+    def _guarded(self, routes: Application) -> Application:
+        """Return the application behind the checks of host, origin and secret."""
+        from starlette.requests import Request
+        from starlette.responses import PlainTextResponse
+
+        async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
+            if scope['type'] != 'http':
+                return
+            request = Request(scope)
+
+            async def send_guarded(message: Scope) -> None:
+                if message['type'] == 'http.response.start':
+                    added = [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
+                    message = {**message, 'headers': [*message['headers'], *added]}
+                await send(message)
+
+            if refusal := self._refuse(request):
+                answer = PlainTextResponse(refusal, status_code=403)
+                await answer(scope, receive, send_guarded)
+            elif scope['path'] == '/api/events':
+                await self._stream(receive, send_guarded)
+            else:
+                await routes(scope, receive, send_guarded)
+
+        return guarded
+
+    def _refuse(self, request: Request) -> str:
+        """Return why a request is not served; nothing if it is."""
+        # A name that somebody else has made point here is none of ours.
+        if request.headers.get('host') not in self._hosts:
+            return 'this page has another address'
+        origin = request.headers.get('origin')
+        if origin and origin.removeprefix('http://') not in self._hosts:
+            return 'another page may not read this one'
+        if request.method != 'GET':
+            return 'this page only shows'
+        if self._brings_secret(request) or self._is_secret(request.cookies.get(self._cookie, '')):
+            return ''
+        return "open the address that 'composer page' prints"
+
+    def _brings_secret(self, request: Request) -> bool:
+        return request.url.path == '/' and self._is_secret(request.query_params.get('token', ''))
+
+    def _is_secret(self, text: str) -> bool:
+        return hmac.compare_digest(text.encode(), self._secret.encode())
+
+    async def _page(self, request: Request) -> Response:
+        from starlette.responses import HTMLResponse, RedirectResponse
+
+        if self._brings_secret(request):
+            answer = RedirectResponse('/', status_code=303)
+            answer.set_cookie(self._cookie, self._secret, httponly=True, samesite='strict')
+            return answer
+        return HTMLResponse(_read_asset('page.html'))
+
+    async def _asset(self, request: Request) -> Response:
+        from starlette.responses import Response
+
+        name = request.path_params['name']
+        if name not in _ASSETS:
+            return Response(status_code=404)
+        return Response(_read_asset(name), media_type=_ASSETS[name])
+
+    async def _state(self, _request: Request) -> Response:
+        return _json(self._source.state)
+
+    async def _drawing(self, _request: Request) -> Response:
+        return _json(self._source.drawing)
+
+    async def _log(self, request: Request) -> Response:
+        after = request.query_params.get('after', '0')
+        number = int(after) if after.isdecimal() else 0
+        return _json([each for each in list(self._source.log) if each['number'] > number])
+
+    async def _parameters(self, request: Request) -> Response:
+        node = request.query_params.get('node', '')
+        known = self._source.state.get('status', {}).get('nodes', [])
+        if node not in known:
+            return _json({'problem': 'there is no such node'}, 404)
+        return await self._ask(lambda client: list_parameters(client, node))
+
+    async def _message(self, request: Request) -> Response:
+        topic = request.query_params.get('topic', '')
+        return await self._ask(lambda client: look_at_message(client, topic))
+
+    async def _ask(self, question: Callable[[Client], Any]) -> Response:
+        """Return what the graph answers to a question."""
+        future: Future[Any] = Future()
+        self._source.ask(question, future)
+        try:
+            return _json(await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_SEC))
+        except (ComposerError, TimeoutError) as error:
+            return _json({'problem': str(error) or 'no answer'}, 504)
+
+    async def _stream(self, receive: Receive, send: Send) -> None:
+        """Send the newest state after each change, until the browser leaves or does not read."""
+        from starlette.responses import PlainTextResponse
+
+        if self._streams >= _MOST_STREAMS:
+            message = f'{_MOST_STREAMS} windows have it open'
+            await PlainTextResponse(message, status_code=503)({'type': 'http'}, receive, send)
+            return
+        waker = asyncio.Event()
+        self._wakers.add(waker)
+        self._streams += 1
+        left = asyncio.ensure_future(_wait_until_left(receive))
+        try:
+            headers = [(b'content-type', b'text/event-stream')]
+            await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
+            while not left.done():
+                waker.clear()
+                text = f'data: {_dump(self._source.state)}\n\n'
+                body = {'type': 'http.response.body', 'body': text.encode(), 'more_body': True}
+                await asyncio.wait_for(send(body), _SEND_SEC)
+                await asyncio.wait([left], timeout=_SHORTEST_PAUSE_SEC)
+                changed = asyncio.ensure_future(waker.wait())
+                await asyncio.wait(
+                    [changed, left], timeout=_KEEP_ALIVE_SEC, return_when=asyncio.FIRST_COMPLETED
+                )
+                changed.cancel()
+        except TimeoutError:
+            pass
+        finally:
+            left.cancel()
+            self._streams -= 1
+            self._wakers.discard(waker)
+
+
+async def _wait_until_left(receive: Receive) -> None:
+    while (await receive())['type'] != 'http.disconnect':
+        pass
+
+
+def _read_asset(name: str) -> str:
+    return resources.files('composer.page').joinpath(name).read_text(encoding='utf-8')
+
+
+def _json(data: Any, code: int = 200) -> Response:
+    from starlette.responses import Response
+
+    return Response(_dump(data), status_code=code, media_type='application/json')
+
+
+def _dump(data: Any) -> str:
+    """Return data as JSON, in which no number is infinite."""
+    return json.dumps(_finite(data), separators=(',', ':'))
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, float) and not math.isfinite(data):
+        return str(data)
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    return [_finite(each) for each in data] if isinstance(data, list | tuple) else data

@@ -1,0 +1,220 @@
+"""What a page shows: asked of a running system again and again, or read from files."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from time import monotonic, time
+from typing import TYPE_CHECKING, Any
+
+from composer.application.file_selection import load_given
+from composer.application.running_systems import answer_forms
+from composer.application.running_systems.client import STATUS_SEC, Client, RunningSystem
+from composer.application.running_systems.discovery import Discovery
+from composer.application.running_systems.health import read_health
+from composer.checks.absent_packages import AbsentPackages
+from composer.checks.checker import check_in_context, create_context
+from composer.drawing.graphviz import DrawingError
+from composer.drawing.picture import build_picture
+from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.page.drawn_parts import describe_drawing
+from composer.page.problems import list_problems
+from composer.runtime.control import protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Future
+
+_SNAPSHOT_SEC = 30.0
+# How often what seldom changes is asked for, in seconds.
+_STATUS_PERIOD_SEC = 2.0
+_POLL_SEC = 0.1
+_MOST_LINES = 500
+_LONGEST_LINE = 2000
+_LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
+
+
+def draw_files(
+    paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Return the drawing of a system with its findings; see `describe_drawing`.
+
+    Raises:
+        ComposerError: The files cannot be read, or there is no Graphviz.
+    """
+    system = load_given(paths, words, set_values, is_shown=True)
+    context = create_context(system, InterfaceCatalogue())
+    findings = AbsentPackages().leave_out(check_in_context(system, context))
+    if context is None:
+        texts = [f'{each.span or each.file}: {each.message}' for each in findings]
+        raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
+    return describe_drawing(build_picture(context, findings))
+
+
+class DrawnFiles:
+    """Stands for a system that does not run.
+
+    Attributes:
+        state: What the page shows, but for the drawing.
+        drawing: See `describe_drawing`; empty for none.
+        changes: Counts the changes of both.
+        changed: Called after each change.
+    """
+
+    def __init__(
+        self, paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
+    ) -> None:
+        self.drawing: dict[str, Any] = draw_files(paths, words, set_values)
+        self.state: dict[str, Any] = {'name': self.drawing['name'], 'runs': False, 'drawing': 1}
+        self.log: deque[dict[str, Any]] = deque()
+        self.changes = 1
+        self.changed: Callable[[], object] = lambda: None
+
+    def start(self) -> None:
+        """There is nothing to watch."""
+
+    def stop(self) -> None:
+        """There is nothing to end."""
+
+    def ask(self, _question: Callable[[Any], Any], _future: Future[Any]) -> None:
+        """Nobody answers."""
+        _future.set_exception(ComposerError('the system does not run'))
+
+
+class WatchedSystem:
+    """Asks a running system in a thread of its own; see `DrawnFiles`.
+
+    Args:
+        name: Of the system; `None` for the only one.
+    """
+
+    def __init__(self, name: str | None) -> None:
+        self._name = name
+        self.drawing: dict[str, Any] = {}
+        self.state: dict[str, Any] = {'name': name or '', 'runs': False}
+        self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
+        self.changes = 0
+        self.changed: Callable[[], object] = lambda: None
+        self._lines = 0
+        self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
+
+    def start(self) -> None:
+        """Begin to ask."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ask no more."""
+        self._ended.set()
+        self._thread.join(STATUS_SEC)
+
+    def ask(self, question: Callable[[Any], Any], future: Future[Any]) -> None:
+        """Have the thread that watches call a function with its client, and fill a future."""
+        self._questions.put((question, future))
+
+    def _run(self) -> None:
+        try:
+            with Client() as client:
+                self._hear_log(client)
+                while not self._ended.is_set():
+                    self._watch(client)
+        except Exception as error:  # noqa: BLE001 - the page shows it
+            self._tell({'runs': False, 'problem': str(error)})
+
+    def _watch(self, client: Client) -> None:
+        """Ask the system until it ends."""
+        try:
+            system = Discovery(client).find(self._name)
+            with (
+                client.asking(system, protocol.STATUS) as ask_status,
+                client.asking(system, protocol.TOP) as ask_health,
+            ):
+                self._draw(client, system)
+                self._follow(client, system, ask_status, ask_health)
+        except ComposerError as error:
+            self._tell({'runs': False, 'problem': str(error)})
+            self._spin(client, monotonic() + 1.0)
+
+    def _follow(self, client: Client, system: RunningSystem, status: Any, health: Any) -> None:
+        said: dict[str, Any] = {}
+        next_status = 0.0
+        while not self._ended.is_set():
+            if monotonic() >= next_status:
+                next_status = monotonic() + _STATUS_PERIOD_SEC
+                before = said
+                said = answer_forms.read_answer(status(STATUS_SEC).text, answer_forms.STATUS)
+                if before and before['last_reload'] != said['last_reload']:
+                    self._draw(client, system)
+            try:
+                found = read_health(health(STATUS_SEC))
+            except ComposerError as error:
+                # As where `diagnostics: false` measures nothing.
+                found = {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
+            self._tell(
+                {
+                    'name': said['name'],
+                    'runs': True,
+                    'problem': found.get('problem', ''),
+                    'time': time(),
+                    'status': said,
+                    'health': found,
+                    'problems': list_problems(said, found),
+                    'drawing': self.state.get('drawing', 0),
+                }
+            )
+            self._spin(client, monotonic() + max(_POLL_SEC, found['period_sec'] / 2))
+
+    def _draw(self, client: Client, system: RunningSystem) -> None:
+        problem = ''
+        try:
+            text = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC).text
+            given = answer_forms.read_answer(text, answer_forms.SNAPSHOT)['given']
+            file = Path((system.status or {}).get('file', ''))
+            layers = [Path(each) for each in given['layers']]
+            self.drawing = draw_files([file, *layers], given['words'], given['set_values'])
+        except (ComposerError, DrawingError) as error:
+            # The page is for the same computer as the files, and shows the rest without.
+            self.drawing, problem = {}, str(error)
+        number = self.state.get('drawing', 0) + 1
+        self._tell({**self.state, 'drawing': number, 'drawing_problem': problem})
+
+    def _hear_log(self, client: Client) -> None:
+        from rcl_interfaces.msg import Log
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        # As the log is published: what was said before comes, too.
+        profile = QoSProfile(depth=_MOST_LINES, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        client.node.create_subscription(Log, '/rosout', self._note_line, profile)
+
+    def _note_line(self, message: Any) -> None:
+        self._lines += 1
+        line = {
+            'number': self._lines,
+            'time': message.stamp.sec + message.stamp.nanosec / 1e9,
+            'level': _LEVELS.get(message.level, 'info'),
+            'name': message.name[:_LONGEST_LINE],
+            'text': message.msg[:_LONGEST_LINE],
+        }
+        self.log.append(line)
+
+    def _spin(self, client: Client, until: float) -> None:
+        """Hear what comes, and answer questions, for a while."""
+        while monotonic() < until and not self._ended.is_set():
+            client.executor.spin_once(timeout_sec=_POLL_SEC)
+            try:
+                question, future = self._questions.get_nowait()
+            except Empty:
+                continue
+            try:
+                future.set_result(question(client))
+            except Exception as error:  # noqa: BLE001 - it is told to who asked
+                future.set_exception(error)
+
+    def _tell(self, state: dict[str, Any]) -> None:
+        self.state = state
+        self.changes += 1
+        self.changed()

@@ -1,0 +1,228 @@
+"""The page of a running system: what it shows, in a real browser, and what it refuses."""
+
+import http.client
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import closing, contextmanager
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('starlette')
+pytest.importorskip('uvicorn')
+
+from tests.running import wait_for
+
+pytestmark = pytest.mark.ros
+
+EVIL = '<img src=x onerror=alert(1)>'
+SYSTEM = f"""
+version: 1
+description: "{EVIL}"
+nodes:
+  talker:
+    namespace: /left
+    parameters: {{gain: {{default: 1.5, maximum: 5.0, description: "{EVIL}"}}}}
+    publishers: {{words: std_msgs/msg/String}}
+    timers: {{say: {{rate: 10, behaviour: 'parts:say', publish: words}}}}
+  ear:
+    subscriptions: {{words: {{topic: /left/words, type: std_msgs/msg/String, behaviour: 'parts:hear'}}}}
+"""
+CODE = f"""
+def say(node):
+    return '{EVIL}' + '.' * round(node.parameters.gain)
+
+def hear(node, message):
+    node.state.count = node.state.count + 1 if hasattr(node.state, 'count') else 1
+    node.logger.warn('{EVIL}', throttle_duration_sec=0.5)
+    raise ValueError('{EVIL}')
+"""
+
+
+class Page:
+    """A page that is served, and its cookie."""
+
+    def __init__(self, domain_id, *words):
+        environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'composer', 'page', '--no-browser', *words],
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+        self.address = self.process.stderr.readline().strip()
+        self.port = int(re.search(r':(\d+)/', self.address)[1])
+        self.path = self.address.partition(str(self.port))[2]
+        self.attributes = self.get(self.path)[1]['set-cookie']
+        self.cookie = self.attributes.partition(';')[0]
+
+    def get(self, path, method='GET', **headers):
+        """Return the status, the headers and the body of an answer."""
+        with closing(http.client.HTTPConnection('127.0.0.1', self.port, timeout=20)) as connection:
+            connection.request(method, path, headers=headers)
+            answer = connection.getresponse()
+            return answer.status, answer.headers, answer.read().decode()
+
+    def json(self, path):
+        return json.loads(self.get(path, cookie=self.cookie)[2])
+
+    @contextmanager
+    def stream(self):
+        """Yield the states that are sent from now on."""
+        with closing(http.client.HTTPConnection('127.0.0.1', self.port, timeout=40)) as connection:
+            connection.request('GET', '/api/events', headers={'cookie': self.cookie})
+            with connection.getresponse() as answer:
+                yield (json.loads(line[6:]) for line in answer if line.startswith(b'data: '))
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        with self.process as process:
+            process.communicate(timeout=30)
+        return process.returncode
+
+
+@pytest.fixture(scope='module')
+def page(shared_compose):
+    child = shared_compose(SYSTEM, CODE)
+    child.wait_until_ready()
+    page = Page(shared_compose.domain_id, 'system')
+    wait_for(lambda: page.json('/api/state').get('health'), 'the system to answer')
+    yield page
+    assert page.end() == 130
+    assert child.stop() == 0
+
+
+def test_the_state_says_what_is_wrong_and_where(page):
+    problems = wait_for(lambda: page.json('/api/state')['problems'], 'errors')
+    assert problems[0]['node'] == '/ear'
+    assert 'subscription words of /ear' in problems[0]['text']
+    state = page.json('/api/state')
+    assert (state['runs'], state['status']['nodes']) == (True, ['/left/talker', '/ear'])
+    assert {row['node'] for row in state['health']['entities']} == {'/left/talker', '/ear'}
+
+
+def test_a_stream_tells_of_changes_and_bears_who_leaves(page):
+    for _ in range(40):
+        with page.stream() as states:
+            assert next(states)['runs']
+    with page.stream() as states:
+        periods = set()
+        while len(periods) < 3:
+            periods.add(next(states)['health']['period'])
+
+
+def test_what_somebody_asks_for_is_there(page):
+    parameters = {each['name']: each for each in page.json('/api/parameters?node=/left/talker')}
+    assert parameters['gain']['value'] == 1.5
+    assert parameters['gain']['range'][1] == 5.0
+    assert EVIL in page.json('/api/message?topic=/left/words')['text']
+    assert (
+        page.json('/api/message?topic=/nothing')['problem'] == "the graph has no topic '/nothing'"
+    )
+    lines = wait_for(lambda: page.json('/api/log'), 'the log')
+    assert EVIL in {each['text'] for each in lines}
+    assert page.json(f'/api/log?after={lines[0]["number"]}')[:1] != lines[:1]
+
+
+@pytest.mark.parametrize('path', ['/', '/api/state', '/api/events', '/api/log', '/page.js'])
+@pytest.mark.parametrize(
+    ('headers', 'method'),
+    [
+        ({'cookie': ''}, 'GET'),
+        ({'cookie': 'composer_page=guess'}, 'GET'),
+        ({'host': 'robot.example:80'}, 'GET'),
+        ({'origin': 'http://robot.example'}, 'GET'),
+        ({'origin': 'null'}, 'GET'),
+        ({}, 'POST'),
+        ({}, 'PUT'),
+    ],
+    ids=str,
+)
+def test_what_is_not_from_its_own_browser_is_refused(page, path, headers, method):
+    status, found, text = page.get(path, method, **({'cookie': page.cookie} | headers))
+    assert status == 403
+    assert found['content-security-policy'].startswith("default-src 'none'; ")
+    assert len(text) < 100
+
+
+def test_only_its_own_scripts_and_files_are_served(page):
+    assert 'HttpOnly' in page.attributes
+    assert 'SameSite=strict' in page.attributes
+    _, headers, text = page.get('/', cookie=page.cookie)
+    assert 'unsafe' not in headers['content-security-policy']
+    assert not re.search(r'<script>|<style>| on\w+=|style=|https?:', text)
+    for path in ('/server.py', '/../server.py', '/%2e%2e/server.py', '/page.html'):
+        assert page.get(path, cookie=page.cookie)[0] == 404
+    with socket.create_connection(('127.0.0.1', page.port)) as raw:
+        raw.sendall(b'GET / HTTP/1.1\r\n\r\n')
+        assert b' 400 ' in raw.recv(100) or b' 403 ' in raw.recv(100)
+
+
+def test_another_address_is_refused_with_the_way_round(shared_compose):
+    done = subprocess.run(
+        [sys.executable, '-m', 'composer', 'page', '--listen', '0.0.0.0'],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert 'not encrypted' in done.stderr
+    assert 'ssh -L' in done.stderr
+
+
+def test_a_file_is_shown_that_does_not_run(page, shared_compose):
+    still = Page(shared_compose.domain_id, str(shared_compose.folder / 'system.yaml'))
+    assert still.json('/api/state') == {'name': 'system', 'runs': False, 'drawing': 1}
+    assert 'node:/ear' in {each['id'] for each in still.json('/api/drawing')['parts'].values()}
+    assert still.end() == 130
+
+
+@pytest.fixture
+def browser():
+    webdriver = pytest.importorskip('selenium.webdriver')
+    if not (shutil.which('chromium') and shutil.which('chromedriver')):
+        pytest.skip('there is no Chromium')
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which('chromium')
+    for each in ('--headless=new', '--no-sandbox', '--disable-gpu', '--window-size=1440,900'):
+        options.add_argument(each)
+    service = webdriver.ChromeService(shutil.which('chromedriver'))
+    browser = webdriver.Chrome(options=options, service=service)
+    yield browser
+    browser.quit()
+
+
+def test_a_browser_shows_it(page, browser):
+    def find(selector):
+        return browser.find_elements('css selector', selector)
+
+    def text_of(selector):
+        return browser.execute_script(
+            f'return document.querySelector("{selector}")?.innerText ?? ""'
+        )
+
+    browser.get(page.address)
+    wait_for(lambda: 'subscription words of /ear' in text_of('#problems'), 'the problem')
+    wait_for(lambda: find('main svg .node.hurts, main svg .node.warns'), 'the node that hurts')
+    # A click on the problem leads to its node, and the keyboard to another one.
+    wait_for(lambda: find('#problems button'), 'the drawing')[0].click()
+    wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the selection')
+    assert browser.current_url.endswith('#node%3A%2Fear')
+    wait_for(lambda: 'subscription words' in text_of('#live'), 'figures')
+    wait_for(lambda: EVIL in text_of('#log'), 'the log')
+    browser.switch_to.active_element.send_keys('/talker\n')
+    wait_for(lambda: text_of('#details h2').startswith('/left/talker'), 'what was searched')
+    wait_for(lambda: EVIL in text_of('#parameters'), 'parameters')
+    assert 'parts:say' in text_of('#details pre')
+    browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fleft%2Fwords')
+    wait_for(lambda: find('#message button'), 'the topic')
+    find('#message button')[0].click()
+    wait_for(lambda: EVIL in text_of('#message pre'), 'a message')
+    assert not find('img')
+    assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
