@@ -7,13 +7,13 @@ PYTHON ?= python3
 WORKERS ?= 4
 VENV := .venv
 ifdef ROS_DISTRO
-EXTRAS := record,types,graph,page,hosts,dev
+EXTRAS := record,types,foxglove,graph,page,hosts,dev
 VENV_FLAGS := --system-site-packages
 else ifeq ($(ROS),kilted)
 VENV := .venv-kilted
-EXTRAS := ros-kilted,interfaces,graph,page,hosts,ros-kilted-test,dev
+EXTRAS := ros-kilted,interfaces,foxglove,graph,page,hosts,ros-kilted-test,dev
 else
-EXTRAS := ros,interfaces,graph,page,hosts,ros-test,dev
+EXTRAS := ros,interfaces,foxglove,graph,page,hosts,ros-test,dev
 endif
 # The packages of a ROS 2 that is sourced are not ours to choose.
 LOCKED := constraints/$(or $(ROS),jazzy).txt

@@ -156,6 +156,21 @@ def _recording() -> list[Row]:
     ]
 
 
+def _foxglove() -> list[Row]:
+    def row(what: str, side: str, target: float) -> Row:
+        ours, other = (_side('foxglove_bridge', name, 50, 'percent') for name in (side, 'alone'))
+        return Row(
+            f'50 nodes at 100 Hz, % of a core for Foxglove, {what}',
+            ours,
+            other,
+            more,
+            '<=',
+            target,
+        )
+
+    return [row('without a client', 'idle', 1), row('one subscribes to all', 'subscribed', 15)]
+
+
 def _simulated() -> list[Row]:
     def row(size: int, target: float) -> Row:
         ours, other = (_side('simulated', side, size, 'speed') for side in ('virtual', 'real'))
@@ -351,6 +366,7 @@ ROWS: list[Row] = [
     *_large_messages(),
     *_overhead(),
     *_recording(),
+    *_foxglove(),
     *_simulated(),
     *_forty(),
     *_further_node(),

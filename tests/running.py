@@ -184,12 +184,12 @@ class Composing:
 
     def run(self, path, *arguments, folder=None):
         """Run `composer up` on a file that is there already."""
-        child = Child(
-            ['up', path, *arguments],
-            folder or self.folder,
-            self.domain_id,
-            self.folder / 'log',
-        )
+        return self.start('up', path, *arguments, folder=folder)
+
+    def start(self, *arguments, folder=None):
+        """Run any command."""
+        log_folder = self.folder / 'log'
+        child = Child(arguments, folder or self.folder, self.domain_id, log_folder)
         self._children.append(child)
         return child
 

@@ -40,7 +40,7 @@ ROOMS = (
         'runtime',
         'launch_files',
     ),
-    *('virtual_time', 'recordings', 'simulation', 'scenarios', 'reports'),
+    *('virtual_time', 'recordings', 'foxglove', 'simulation', 'scenarios', 'reports'),
     'stubs',
     *('export', 'hosts'),
     'application',

@@ -201,7 +201,7 @@ def _run(  # noqa: PLR0913 - as above
         if reading is None:
             return ExitCode.FAILED
         reloader = create_reloader(prefixes)
-        with recording.recorder() as recorder:
+        with recording.recorder(context.spec.name) as recorder:
             return run_system(
                 reading,
                 watch=reloader.watching if watches else None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import threading
+from collections import deque
 from contextlib import suppress
 from time import monotonic, thread_time, time_ns
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
     from composer.recordings.mcap_writer import Channel
-    from composer.recordings.recorder import Recorder
-    from composer.recordings.topic_patterns import TopicPatterns
+    from composer.recordings.recorder import Sink
+    from composer.recordings.topic_patterns import Patterns
 
 # A look at the graph takes at most a fiftieth of the time.
 _SHORTEST_PAUSE_SEC: Final = 0.1
@@ -64,6 +65,9 @@ class OwnPublishers(Protocol):
     def adopt(self, node: RosNode, subscription: RosSubscription) -> None:
         """Note that a subscription needs nothing of them."""
 
+    def drop(self, subscription: RosSubscription) -> None:
+        """Forget a subscription."""
+
     def release(self, node: RosNode) -> None:
         """Forget the subscriptions of a node."""
 
@@ -78,6 +82,9 @@ class _NoPublishers:
         return False
 
     def adopt(self, node: RosNode, subscription: RosSubscription) -> None:
+        """There is nobody to tell."""
+
+    def drop(self, subscription: RosSubscription) -> None:
         """There is nobody to tell."""
 
     def release(self, node: RosNode) -> None:
@@ -117,8 +124,8 @@ class GraphRecorder:
     def __init__(
         self,
         node: RosNode,
-        recorder: Recorder,
-        patterns: TopicPatterns,
+        recorder: Sink,
+        patterns: Patterns,
         report: Callable[[str], object],
         own: OwnPublishers | None = None,
     ) -> None:
@@ -129,6 +136,7 @@ class GraphRecorder:
         self._own = own or _NoPublishers()
         self.topics: set[str] = set()
         self._listeners: dict[int, _Listener] = {}
+        self._forgotten: deque[str] = deque()
         self._heard: set[tuple[str, str]] = set()
         # What seemed to have publishers of others at the last look.
         self._suspected: set[str] = set()
@@ -142,6 +150,21 @@ class GraphRecorder:
         """Subscribe to the topics that there are, and begin to look for others."""
         self._look()
         self._thread.start()
+
+    def forget(self, topic: str) -> None:
+        """Listen to a topic no more, or anew if it is still meant; any thread may call it."""
+        self._forgotten.append(topic)
+
+    def _drop_forgotten(self) -> None:
+        forgotten = {self._forgotten.popleft() for _ in range(len(self._forgotten))}
+        for event, listener in list(self._listeners.items()):
+            if listener.channel.topic in forgotten:
+                self._poll.unregister(event)
+                del self._listeners[event]
+                listener.close()
+                self._own.drop(listener.ros)
+                self._node.destroy_subscription(listener.ros)
+        self._heard = {each for each in self._heard if each[0] not in forgotten}
 
     def stop(self) -> None:
         """Record what has come, and end the subscriptions."""
@@ -173,6 +196,7 @@ class GraphRecorder:
     def _look(self) -> float:
         """Subscribe to the topics that have come; return when to look again, in seconds."""
         begun = thread_time()
+        self._drop_forgotten()
         found = list(self._find_new())
         self._tell_unmatched()
         pause_sec = _PAUSE_FACTOR * (thread_time() - begun)

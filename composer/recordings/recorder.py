@@ -52,6 +52,35 @@ class Log(Protocol):
         """Tell what is not."""
 
 
+class Queue(Protocol):
+    """Takes messages."""
+
+    def __len__(self) -> int:
+        """Return how many wait."""
+
+    def append(self, entry: Entry, /) -> None:
+        """Take one."""
+
+
+class Sink(Protocol):
+    """What is done with messages of topics; see `Recorder`."""
+
+    room: int
+    lost: int
+
+    @property
+    def queue(self) -> Queue:
+        """Takes the messages."""
+
+    def open_channel(
+        self, topic: str, message_class: type, offers: Iterable[Mapping[str, Any]]
+    ) -> Channel:
+        """Return the channel of a topic and type."""
+
+    def finish(self, remarks: Iterable[str] = ()) -> None:
+        """End."""
+
+
 class Recorder:
     """Writes a recording from its creation until `finish`.
 

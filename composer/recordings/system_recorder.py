@@ -15,6 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.recordings.graph_recorder import GraphRecorder, read_offer
 from composer.recordings.serialized_messages import identify_publisher
+from composer.runtime.messages.local_delivery import is_latched
 from composer.runtime.middleware.ros_graph import create_graph_node
 
 if TYPE_CHECKING:
@@ -25,9 +26,13 @@ if TYPE_CHECKING:
     from rclpy.subscription import Subscription as RosSubscription
 
     from composer.recordings.mcap_writer import Channel
-    from composer.recordings.recorder import Recorder
-    from composer.recordings.topic_patterns import TopicPatterns
-    from composer.runtime.messages.local_delivery import LocalPublisher, LocalTopics
+    from composer.recordings.recorder import Sink
+    from composer.recordings.topic_patterns import Patterns
+    from composer.runtime.messages.local_delivery import (
+        LocalPublisher,
+        LocalSubscription,
+        LocalTopics,
+    )
 
 _NODE_NAME: Final = '_composer_recorder'
 
@@ -39,11 +44,20 @@ class SystemRecorder:
         recorder: Writes the file.
         patterns: Which topics.
         report: Gets what keeps a topic, or a message, from being recorded.
+        node_name: Of the node that listens to others.
+        is_late: Whether it may begin with a topic when messages have been latched.
     """
 
     def __init__(
-        self, recorder: Recorder, patterns: TopicPatterns, report: Callable[[str], object]
+        self,
+        recorder: Sink,
+        patterns: Patterns,
+        report: Callable[[str], object],
+        node_name: str = _NODE_NAME,
+        *,
+        is_late: bool = False,
     ) -> None:
+        self._node_name, self._is_late = node_name, is_late
         self._recorder = recorder
         self._patterns = patterns
         self._report = report
@@ -58,13 +72,19 @@ class SystemRecorder:
         Args:
             topics: Those of the system.
         """
-        own = _OwnPublishers(topics)
+        own = _OwnPublishers(topics, leaves_latched=self._is_late)
         self._topics = topics
         self._find = partial(self._find_tap, own)
         topics.tap(self._find)
-        self._node = create_graph_node(context, _NODE_NAME)
+        self._node = create_graph_node(context, self._node_name)
         self._graph = GraphRecorder(self._node, self._recorder, self._patterns, self._report, own)
         self._graph.start()
+
+    def follow(self, topic: str) -> None:
+        """Begin anew with a topic, of which the patterns may say something else now."""
+        if self._topics is not None and self._graph is not None:
+            self._graph.forget(topic)
+            self._topics.follow_taps()
 
     def stop(self) -> None:
         """Record what has come, and complete the file; do nothing the second time."""
@@ -85,7 +105,7 @@ class SystemRecorder:
     ) -> Callable[[Any], None] | None:
         ros = publisher.ros
         topic = ros.topic_name
-        if not self._patterns.has(topic):
+        if not self._patterns.has(topic) or (self._is_late and is_latched(ros)):
             return None
         own.publishers.add(identify_publisher(ros))
         offers = [read_offer(ros.qos_profile)]
@@ -94,7 +114,7 @@ class SystemRecorder:
 
 
 def create_tap(
-    recorder: Recorder,
+    recorder: Sink,
     channel: Channel,
     message_class: type,
     report: Callable[[str], object],
@@ -122,18 +142,23 @@ class _OwnPublishers:
 
     may_be_late = True
 
-    def __init__(self, topics: LocalTopics) -> None:
+    def __init__(self, topics: LocalTopics, *, leaves_latched: bool) -> None:
         self._topics = topics
+        self._leaves_latched = leaves_latched
         self.publishers: set[bytes] = set()
+        self._listeners: dict[RosSubscription, LocalSubscription] = {}
 
     def count(self, topic: str) -> int:
-        return self._topics.count_publishers(topic)
+        return self._topics.count_publishers(topic, leaves_latched=self._leaves_latched)
 
     def has(self, publisher: bytes) -> bool:
         return publisher in self.publishers
 
     def adopt(self, node: RosNode, subscription: RosSubscription) -> None:
-        self._topics.add_listener(node, subscription)
+        self._listeners[subscription] = self._topics.add_listener(node, subscription)
+
+    def drop(self, subscription: RosSubscription) -> None:
+        self._topics.remove_subscription(self._listeners.pop(subscription))
 
     def release(self, node: RosNode) -> None:
         self._topics.forget(node)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from fnmatch import translate
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from composer.errors import UsageError
 from composer.spelling import did_you_mean, find_nearest
@@ -15,6 +15,16 @@ if TYPE_CHECKING:
 _WILDCARDS: Final = '*?['
 # Of names that tools do not list (https://design.ros2.org/articles/topic_and_service_names.html).
 _HIDDEN: Final = '/_'
+
+
+class Patterns(Protocol):
+    """Which topics are meant; see `TopicPatterns`."""
+
+    def has(self, topic: str) -> bool:
+        """Return whether a topic is."""
+
+    def describe_unused(self, topics: Collection[str]) -> list[str]:
+        """Return what is missing."""
 
 
 class TopicPatterns:

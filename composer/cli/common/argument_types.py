@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from composer.errors import UsageError
+from composer.foxglove import BridgeOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -234,3 +235,40 @@ def _find_near(word: str, context: click.Context) -> list[str]:
     options = [option for each in context.command.get_params(context) for option in each.opts]
     near = find_nearest(word.partition('=')[0], options)
     return [near] if near else []
+
+
+FOXGLOVE_PORT = 8765
+LAST_PORT = 65_535
+
+
+def takes_bridge(command: _Command) -> _Command:
+    """Add how Foxglove is served (`address`, `allows_changes`) to a command."""
+    changes = click.option(
+        '--allow-changes',
+        'allows_changes',
+        is_flag=True,
+        help='Let Foxglove publish, call services and set parameters.',
+    )
+    listen = click.option(
+        '--listen',
+        'address',
+        metavar='ADDRESS',
+        help='Let Foxglove connect from elsewhere, as 0.0.0.0 does. Default: 127.0.0.1.',
+    )
+    return listen(changes(command))
+
+
+def bridge_options(
+    port: int | None, address: str | None, *, allows_changes: bool
+) -> BridgeOptions | None:
+    """Return how Foxglove is served; `None` without a port.
+
+    Raises:
+        UsageError: It is not served, but options say how.
+    """
+    if port is not None:
+        return BridgeOptions(port, address or '127.0.0.1', allows_changes)
+    if address or allows_changes:
+        message = '--listen and --allow-changes are for --foxglove'
+        raise UsageError(message, help='add it, as in --foxglove 8765')
+    return None

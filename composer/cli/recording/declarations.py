@@ -6,7 +6,14 @@ from pathlib import Path
 
 import click
 
-from composer.cli.common.argument_types import takes_topics
+from composer.cli.common.argument_types import (
+    FOXGLOVE_PORT,
+    LAST_PORT,
+    bridge_options,
+    takes_bridge,
+    takes_topics,
+)
+from composer.errors import ExitCode
 
 
 @click.command('record')
@@ -78,4 +85,29 @@ def replay_command(
     )
 
 
-COMMANDS = (record_command, replay_command)
+@click.command('foxglove')
+@click.argument('name', metavar='[SYSTEM]', required=False)
+@click.option(
+    '--port',
+    type=click.IntRange(0, LAST_PORT),
+    default=FOXGLOVE_PORT,
+    show_default=True,
+    metavar='PORT',
+    help='Where to serve it; 0 for any that is free.',
+)
+@takes_bridge
+def foxglove_command(
+    name: str | None, port: int, address: str | None, *, allows_changes: bool
+) -> int:
+    """Show SYSTEM to Foxglove.
+
+    All that is on its ROS graph is shown, until it is interrupted. SYSTEM is its name; if only one
+    runs, it need not be named.
+    """
+    from composer.cli.recording.foxglove import serve
+
+    options = bridge_options(port, address, allows_changes=allows_changes)
+    return serve(name, options) if options else ExitCode.USAGE
+
+
+COMMANDS = (record_command, replay_command, foxglove_command)

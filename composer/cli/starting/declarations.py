@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
@@ -9,9 +10,13 @@ import click
 
 from composer.application.recording_options import RecordingOptions
 from composer.cli.common.argument_types import (
+    FOXGLOVE_PORT,
+    LAST_PORT,
     NUMBERS_ARE_VALUES,
+    bridge_options,
     check_log_levels,
     split_words,
+    takes_bridge,
     takes_host,
     takes_system,
     takes_topics,
@@ -20,7 +25,17 @@ from composer.errors import ExitCode
 from composer.terminal import escape
 
 
-@click.command('up', context_settings={**NUMBERS_ARE_VALUES, 'help_option_names': []})
+class _Up(click.Command):
+    """Takes `--foxglove` before a file, too: its port may be left out."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        for i, (word, following) in enumerate(pairwise(args)):
+            if word == '--foxglove' and not following.isdecimal():
+                args[i] = f'{word}={FOXGLOVE_PORT}'
+        return super().parse_args(ctx, args)
+
+
+@click.command('up', cls=_Up, context_settings={**NUMBERS_ARE_VALUES, 'help_option_names': []})
 @takes_system
 @click.option(
     '--log-level',
@@ -64,6 +79,16 @@ from composer.terminal import escape
     help='Write a timeline of all callbacks to this file, which Perfetto opens.',
 )
 @click.option(
+    '--foxglove',
+    'port',
+    type=click.IntRange(0, LAST_PORT),
+    is_flag=False,
+    flag_value=FOXGLOVE_PORT,
+    metavar='[PORT]',
+    help=f'Show it to Foxglove at this port; 0 for any, {FOXGLOVE_PORT} by default.',
+)
+@takes_bridge
+@click.option(
     '--hold',
     type=click.Path(path_type=Path, dir_okay=False),
     metavar='FILE',
@@ -82,10 +107,13 @@ def up_command(  # noqa: PLR0913 - one for each option
     *,
     watches: bool,
     detaches: bool,
+    allows_changes: bool,
     is_asked: bool,
     record: Path | None,
     topics: tuple[str, ...],
     trace: IO[str] | None,
+    port: int | None,
+    address: str | None,
     hold: Path | None,
     wants_help: bool,
 ) -> int:
@@ -114,6 +142,9 @@ def up_command(  # noqa: PLR0913 - one for each option
         options += [f'--record={record}'] * (record is not None)
         options += [f'--topics={each}' for each in topics]
         options += [] if trace is None else [f'--trace={trace.name}']
+        options += [] if port is None else [f'--foxglove={port}']
+        options += [] if address is None else [f'--listen={address}']
+        options += ['--allow-changes'] * allows_changes
         options += [f'--hold={hold}'] * (hold is not None)
         given = [*options, *words, '--ros-args', *context.obj, '--']
         return start_detached(paths[0], given, host)
@@ -126,7 +157,9 @@ def up_command(  # noqa: PLR0913 - one for each option
         host=host,
         watches=watches,
         is_asked=is_asked,
-        recording=RecordingOptions(record, topics),
+        recording=RecordingOptions(
+            record, topics, bridge_options(port, address, allows_changes=allows_changes)
+        ),
         hold=hold,
         trace=trace,
         ends_process=True,

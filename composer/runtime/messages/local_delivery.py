@@ -239,6 +239,11 @@ class LocalSubscription:
         self.waits = waits
 
 
+def is_latched(ros: RosPublisher) -> bool:
+    """Tell whether subscriptions that come later get messages that were published before."""
+    return bool(ros.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
+
 def _always_sends(profile: QoSProfile) -> bool:
     """Tell whether a message counts although nobody hears it.
 
@@ -369,11 +374,18 @@ class LocalTopics:
             topic.connect()
         return subscription
 
-    def count_publishers(self, name: str) -> int:
-        """Return how many publishers a topic has in this system, of any type."""
+    def count_publishers(self, name: str, *, leaves_latched: bool = False) -> int:
+        """Return how many publishers a topic has in this system, of any type.
+
+        Args:
+            leaves_latched: Whether those are left out whose messages late subscriptions get.
+        """
         with self._lock:
             return sum(
-                len(topic.publishers) for (each, _), topic in self._topics.items() if each == name
+                not (leaves_latched and is_latched(publisher.ros))
+                for (each, _), topic in self._topics.items()
+                if each == name
+                for publisher in topic.publishers
             )
 
     def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:

@@ -1,0 +1,292 @@
+"""Shows Foxglove what is on the ROS graph: a client gets the messages that it subscribes to.
+
+Messages are taken as a recording takes them: see `SystemRecorder`.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import Counter, deque
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Final
+
+import foxglove
+from foxglove.websocket import Capability, ServerListener
+from rclpy.exceptions import InvalidHandle
+
+from composer.errors import ComposerError, StartError
+from composer.foxglove.graph_access import GraphAccess
+from composer.interfaces.classes import interface_name
+from composer.recordings.definitions import ENCODING, full_definition, import_message
+from composer.recordings.system_recorder import SystemRecorder
+from composer.records import record
+from composer.runtime.messages.local_delivery import LocalTopics
+from composer.runtime.middleware.ros_graph import create_graph_node
+from composer.runtime.system_executor import SystemExecutor
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from foxglove.websocket import ChannelView, Client, ClientChannel, Parameter
+    from rclpy.context import Context
+
+    from composer.foxglove import BridgeOptions
+    from composer.recordings.recorder import Entry, Log
+
+_LOOK_SEC: Final = 1.0
+_STOP_SEC: Final = 2.0
+_BURST_SEC: Final = 0.02
+# For a client that does not read; older messages are dropped then.
+_BACKLOG: Final = 256
+_HIDDEN: Final = '/_'
+_LISTENER: Final = '_composer_foxglove_listener'
+
+
+@record
+class _Channel:
+    """A topic of one type, as clients see it."""
+
+    topic: str
+    base: foxglove.Channel
+
+
+class FoxgloveBridge(ServerListener):
+    """Serves clients from `start` to `stop`; it is the recorder of what they subscribe to.
+
+    Args:
+        name: What clients show.
+        log: Gets the address, and what keeps a topic from being shown.
+
+    Attributes:
+        queue: Takes messages, and sends them soon.
+        room: As the next one, for who asks a recorder.
+        lost: Always 0: the server drops what a client does not take.
+
+    Raises:
+        StartError: The port is taken.
+    """
+
+    room, lost = 1, 0
+
+    def __init__(self, options: BridgeOptions, name: str, log: Log) -> None:
+        self.queue: Any = self
+        self._log = log
+        self._allows_changes = options.allows_changes
+        self._sink = foxglove.Context()
+        self._channels: dict[tuple[str, str], _Channel] = {}
+        self._services: set[str] = set()
+        self._wanted: Counter[str] = Counter()
+        self._shows_graph = threading.Event()
+        # What the threads of the server tell; they may hold its locks.
+        self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._ended = threading.Event()
+        self._entries: deque[Any] = deque()
+        self._has_entries = threading.Event()
+        changing = [Capability.ClientPublish, Capability.Services]
+        reading = [Capability.ConnectionGraph, Capability.Parameters]
+        try:
+            self._server = foxglove.start_server(
+                name=name,
+                host=options.address,
+                port=options.port,
+                capabilities=[*reading, *(changing if options.allows_changes else ())],
+                supported_encodings=['cdr'],
+                server_listener=self,
+                context=self._sink,
+                message_backlog_size=_BACKLOG,
+            )
+        except (OSError, RuntimeError, ValueError) as error:
+            message = f'Foxglove cannot be served at {options.address}:{options.port}: {error}'
+            raise StartError(message, help='--foxglove 0 takes any port that is free') from error
+        log.info(f'Foxglove: open ws://{options.address}:{self._server.port}')
+        self._recorder = SystemRecorder(self, self, log.warning, _LISTENER, is_late=True)
+        self._thread = threading.Thread(target=self._run, name='composer-foxglove', daemon=True)
+        self._sender = threading.Thread(target=self._send, name='composer-sender', daemon=True)
+
+    def start(self, context: Context, topics: LocalTopics | None = None) -> None:
+        """Begin.
+
+        Args:
+            topics: Those of the system that runs in this process.
+        """
+        self._executor = SystemExecutor(context, None, log=self._tell_error)
+        self._node = create_graph_node(context, '_composer_foxglove')
+        self._executor.add_node(self._node)
+        self._access = GraphAccess(self._node, self._server)
+        self._executor.start()
+        self._recorder.start(context, topics or LocalTopics(self._executor))
+        self._thread.start()
+        self._sender.start()
+
+    def stop(self) -> None:
+        """End; do nothing the second time, or if it never began."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        self._told.put('')
+        self._has_entries.set()
+        if self._thread.ident is not None:
+            self._thread.join(_STOP_SEC)
+            self._recorder.stop()
+            self._executor.stop(_STOP_SEC)
+            self._node.destroy_node()
+        self._server.stop()
+
+    def _tell_error(self, text: str) -> None:
+        self._log.error(text)
+
+    # As a recorder, and as its patterns
+
+    def __len__(self) -> int:
+        return 0
+
+    def append(self, entry: Entry) -> None:
+        """Have a message sent to those who subscribe to its channel."""
+        self._entries.append(entry)
+        if not self._has_entries.is_set():
+            self._has_entries.set()
+
+    def _send(self) -> None:
+        """Send what comes in bursts: to wake the server for each message costs far more."""
+        entries = self._entries
+        while not self._ended.is_set():
+            self._has_entries.wait()
+            self._has_entries.clear()
+            for _ in range(len(entries)):
+                channel, _, published_ns, data = entries.popleft()
+                channel.base.log(data, log_time=published_ns)
+            self._ended.wait(_BURST_SEC)
+
+    def has(self, topic: str) -> bool:
+        """Return whether a client subscribes to a topic."""
+        return self._wanted[topic] > 0
+
+    def open_channel(
+        self, topic: str, message_class: type, _offers: Iterable[Mapping[str, Any]] = ()
+    ) -> Any:
+        """Return the channel of a topic and type, of which there is one."""
+        key = topic, interface_name(message_class)
+        if key not in self._channels:
+            schema = self._create_schema(message_class)
+            channel = foxglove.Channel(
+                topic, message_encoding='cdr', schema=schema, context=self._sink
+            )
+            self._channels[key] = _Channel(topic, channel)
+        return self._channels[key]
+
+    def finish(self, _remarks: Iterable[str] = ()) -> None:
+        """Do nothing: what was sent is sent."""
+
+    def describe_unused(self, _topics: Iterable[str]) -> list[str]:
+        """Return nothing: what clients subscribe to is there."""
+        return []
+
+    # The graph
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            # A behaviour may have shut down what all use; the system ends then.
+            with suppress(InvalidHandle):
+                self._look()
+            with suppress(queue.Empty):
+                topic = self._told.get(timeout=_LOOK_SEC)
+                if topic:
+                    self._recorder.follow(topic)
+
+    def _look(self) -> None:
+        """Show topics and services that have come, and no more those that have gone."""
+        topics = {
+            (topic, each)
+            for topic, types in self._node.get_topic_names_and_types()
+            if _HIDDEN not in topic
+            for each in types
+        }
+        for topic, type_name in topics - self._channels.keys():
+            with suppress(ComposerError):
+                self.open_channel(topic, import_message(type_name))
+        for key in self._channels.keys() - topics:
+            self._channels.pop(key).base.close()
+        if self._allows_changes:
+            self._show_services()
+        if self._shows_graph.is_set():
+            self._access.show_graph({topic for topic, _ in topics})
+
+    def _show_services(self) -> None:
+        services = {
+            name: types[0]
+            for name, types in self._node.get_service_names_and_types()
+            if _HIDDEN not in name
+        }
+        for name in services.keys() - self._services:
+            with suppress(ComposerError):
+                service = self._access.create_service(name, services[name], self._create_schema)
+                self._server.add_services([service])
+        if gone := self._services - services.keys():
+            self._server.remove_services(list(gone))
+        self._services = set(services)
+
+    def _create_schema(self, message_class: type) -> Any:
+        data = full_definition(message_class).encode()
+        return foxglove.Schema(name=interface_name(message_class), encoding=ENCODING, data=data)
+
+    # What clients ask: `foxglove.websocket.ServerListener`
+
+    def on_subscribe(self, _client: Client, channel: ChannelView) -> None:
+        """Have the topic listened to; anew, if it is, as a latched message is then sent again."""
+        self._wanted[channel.topic] += 1
+        self._told.put(channel.topic)
+
+    def on_unsubscribe(self, _client: Client, channel: ChannelView) -> None:
+        """Listen no more, if this was the last one."""
+        self._wanted[channel.topic] -= 1
+        if not self._wanted[channel.topic]:
+            self._told.put(channel.topic)
+
+    def on_connection_graph_subscribe(self) -> None:
+        """Show the graph, at once and when it changes."""
+        self._access.graph = None
+        self._shows_graph.set()
+        self._told.put('')
+
+    def on_connection_graph_unsubscribe(self) -> None:
+        """Show it no more."""
+        self._shows_graph.clear()
+
+    def on_get_parameters(
+        self, _client: Client, param_names: list[str], request_id: str | None = None
+    ) -> list[Parameter]:
+        """Return parameters by their names, as in `/arm.speed`; all if there are none."""
+        del request_id
+        return self._access.get_parameters(param_names)
+
+    def on_set_parameters(
+        self, _client: Client, parameters: list[Parameter], request_id: str | None = None
+    ) -> list[Parameter]:
+        """Set parameters, and return what they are then."""
+        del request_id
+        if self._allows_changes:
+            self._access.set_parameters(parameters)
+        else:
+            self._access.refuse('parameters are set only with --allow-changes')
+        return self._access.get_parameters([each.name for each in parameters])
+
+    def on_parameters_subscribe(self, param_names: list[str]) -> None:
+        """Send these when they change."""
+        self._access.follow_parameters(param_names)
+
+    def on_parameters_unsubscribe(self, param_names: list[str]) -> None:
+        """Send these no more."""
+        self._access.followed.difference_update(param_names)
+
+    def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
+        """Have a publisher for a client."""
+        self._access.advertise((client.id, channel.id), channel.topic, channel.schema_name)
+
+    def on_client_unadvertise(self, client: Client, client_channel_id: int) -> None:
+        """Destroy it."""
+        self._access.unadvertise((client.id, client_channel_id))
+
+    def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
+        """Publish a message of a client."""
+        self._access.publish((client.id, client_channel_id), data)

@@ -1,0 +1,251 @@
+"""What clients of Foxglove do on the ROS graph: parameters, services, publications."""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict
+from contextlib import suppress
+from functools import partial
+from time import monotonic
+from typing import TYPE_CHECKING, Any, Final
+
+from foxglove.websocket import (
+    ConnectionGraph,
+    MessageSchema,
+    Parameter,
+    Service,
+    ServiceSchema,
+    StatusLevel,
+)
+from rcl_interfaces.msg import ParameterEvent, ParameterType
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.node import NodeNameNonExistentError
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter import parameter_value_to_python
+from rclpy.serialization import deserialize_message, serialize_message
+
+from composer.errors import CallTimeoutError
+from composer.interfaces.classes import import_interface
+from composer.names import join_names
+from composer.recordings.definitions import import_message
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from foxglove.websocket import ServiceRequest, WebSocketServer
+    from rclpy.node import Node
+
+_ANSWER_SEC: Final = 5.0
+_LIST: Final = '/list_parameters'
+
+
+class GraphAccess:
+    """A node that acts for clients; an executor spins it.
+
+    Attributes:
+        followed: The names of the parameters that clients want to be told of.
+        graph: What clients were shown of it; `None` for nothing.
+    """
+
+    def __init__(self, node: Node, server: WebSocketServer) -> None:
+        self._node = node
+        self._server = server
+        self._clients: dict[str, Any] = {}
+        self._publishers: dict[tuple[int, int], Any] = {}
+        self._lock = threading.Lock()
+        self.followed: set[str] = set()
+        self.graph: Any = None
+        self._events: Any = None
+
+    def refuse(self, reason: str) -> None:
+        """Show clients why something is not done."""
+        self._server.publish_status(reason, StatusLevel.Warning)
+
+    def show_graph(self, topics: Iterable[str]) -> None:
+        """Show clients who publishes, hears and serves what, if that is new."""
+        node, servers = self._node, defaultdict[str, list[str]](list)
+        for name, namespace in node.get_node_names_and_namespaces():
+            # It may have gone meanwhile.
+            with suppress(NodeNameNonExistentError):
+                for service, _ in node.get_service_names_and_types_by_node(name, namespace):
+                    servers[service].append(join_names(namespace, name))
+        published = {each: _nodes_of(node.get_publishers_info_by_topic(each)) for each in topics}
+        heard = {each: _nodes_of(node.get_subscriptions_info_by_topic(each)) for each in topics}
+        if self.graph == (published, heard, servers):
+            return
+        self.graph, graph = (published, heard, servers), ConnectionGraph()
+        for topic, nodes in published.items():
+            graph.set_published_topic(topic, nodes)
+        for topic, nodes in heard.items():
+            graph.set_subscribed_topic(topic, nodes)
+        for service, nodes in servers.items():
+            graph.set_advertised_service(service, nodes)
+        self._server.publish_connection_graph(graph)
+
+    def _call_all(self, calls: Sequence[tuple[Any, str, Any]]) -> Iterator[Any]:
+        """Yield the response to each request, `None` if there is none in time.
+
+        Args:
+            calls: The class of each service, its name, and the request.
+        """
+        futures = []
+        deadline = monotonic() + _ANSWER_SEC
+        for service_class, name, _ in calls:
+            with self._lock:
+                if name not in self._clients:
+                    self._clients[name] = self._node.create_client(service_class, name)
+        for _, name, request in calls:
+            client = self._clients[name]
+            is_there = client.wait_for_service(max(0.0, deadline - monotonic()))
+            futures.append(client.call_async(request) if is_there else None)
+        for future in futures:
+            done = threading.Event()
+            if future is not None:
+                future.add_done_callback(lambda _, done=done: done.set())
+                done.wait(max(0.0, deadline - monotonic()))
+            yield future.result() if future is not None and future.done() else None
+
+    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """Return parameters by their names, as in `/arm.speed`; all if there are none."""
+        values = self._read(names or self._list_parameters())
+        return [each for name, value in values.items() for each in _show(name, value)]
+
+    def _list_parameters(self) -> list[str]:
+        services = [name for name, _ in self._node.get_service_names_and_types()]
+        nodes = [name.removesuffix(_LIST) for name in services if name.endswith(_LIST)]
+        calls = [(ListParameters, node + _LIST, ListParameters.Request()) for node in nodes]
+        answers = zip(nodes, self._call_all(calls), strict=True)
+        return [f'{node}.{name}' for node, each in answers if each for name in each.result.names]
+
+    def _read(self, names: Iterable[str]) -> dict[str, Any]:
+        # A node that does not have one of several answers nothing.
+        parts = [name.partition('.') for name in names]
+        calls = [
+            (GetParameters, f'{node}/get_parameters', GetParameters.Request(names=[name]))
+            for node, _, name in parts
+        ]
+        answers = zip(parts, self._call_all(calls), strict=True)
+        return {
+            f'{node}.{name}': response.values[0]
+            for (node, _, name), response in answers
+            if response is not None and response.values
+        }
+
+    def set_parameters(self, parameters: Sequence[Parameter]) -> None:
+        """Set parameters; tell clients which are refused."""
+        given = {each.name: each.get_value() for each in parameters}
+        types = {name: value.type for name, value in self._read(given).items()}
+        wanted = _by_node((name, _fit(value, types.get(name))) for name, value in given.items())
+        calls = []
+        for node, values in wanted.items():
+            messages = [
+                RosParameter(name, value=value).to_parameter_msg()
+                for name, value in values.items()
+            ]
+            request = SetParameters.Request(parameters=messages)
+            calls.append((SetParameters, f'{node}/set_parameters', request))
+        for (node, values), response in zip(wanted.items(), self._call_all(calls), strict=True):
+            if response is None:
+                self.refuse(f'{node} does not answer')
+                continue
+            for name, result in zip(values, response.results, strict=True):
+                if not result.successful:
+                    self.refuse(f'{node}.{name} was not set: {result.reason}')
+
+    def follow_parameters(self, names: Iterable[str]) -> None:
+        """Send these to clients when they change."""
+        self.followed.update(names)
+        if self._events is None:
+            self._events = self._node.create_subscription(
+                ParameterEvent, '/parameter_events', self._take_event, 100
+            )
+
+    def _take_event(self, event: ParameterEvent) -> None:
+        changed = [
+            parameter
+            for each in (*event.new_parameters, *event.changed_parameters)
+            if (name := f'{event.node}.{each.name}') in self.followed
+            for parameter in _show(name, each.value)
+        ]
+        if changed:
+            self._server.publish_parameter_values(changed)
+
+    def create_service(
+        self, name: str, type_name: str, create_schema: Callable[[type], Any]
+    ) -> Service:
+        """Return a service of the graph as clients call it.
+
+        Raises:
+            ComposerError: Its type is not installed.
+        """
+        service_class: Any = import_interface(type_name)
+        request, response = (
+            MessageSchema(encoding='cdr', schema=create_schema(part))
+            for part in (service_class.Request, service_class.Response)
+        )
+        schema = ServiceSchema(type_name, request=request, response=response)
+        return Service(name, schema=schema, handler=partial(self._serve, service_class))
+
+    def _serve(self, service_class: Any, asked: ServiceRequest) -> bytes:
+        request = deserialize_message(asked.payload, service_class.Request)
+        (response,) = self._call_all([(service_class, asked.service_name, request)])
+        if response is None:
+            message = f"'{asked.service_name}' did not answer within {_ANSWER_SEC:g} s"
+            raise CallTimeoutError(message)
+        return bytes(serialize_message(response))
+
+    def advertise(self, key: tuple[int, int], topic: str, type_name: str) -> None:
+        """Create a publisher for a client."""
+        try:
+            publisher = self._node.create_publisher(import_message(type_name), topic, 10)
+        except Exception as error:  # noqa: BLE001 - rclpy raises many kinds for wrong names
+            self.refuse(f"'{topic}' cannot be published: {error}")
+            return
+        self._publishers[key] = publisher
+
+    def unadvertise(self, key: tuple[int, int]) -> None:
+        """Destroy the publisher of a client."""
+        if (publisher := self._publishers.pop(key, None)) is not None:
+            self._node.destroy_publisher(publisher)
+
+    def publish(self, key: tuple[int, int], data: bytes) -> None:
+        """Publish a message of a client, in CDR."""
+        if (publisher := self._publishers.get(key)) is not None:
+            publisher.publish(data)
+
+
+def _nodes_of(ends: Iterable[Any]) -> list[str]:
+    """Return the nodes of publishers or subscriptions that are not hidden, as those of tools."""
+    nodes = {join_names(each.node_namespace, each.node_name) for each in ends}
+    return sorted(node for node in nodes if '/_' not in node)
+
+
+def _by_node(values: Iterable[tuple[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return values of `/arm.speed` by node and name."""
+    found: dict[str, dict[str, Any]] = {}
+    for full_name, value in values:
+        # Only parameters may have dots.
+        node, _, name = full_name.partition('.')
+        found.setdefault(node, {})[name] = value
+    return found
+
+
+def _show(name: str, value: Any) -> Iterator[Parameter]:
+    native = parameter_value_to_python(value)
+    if value.type == ParameterType.PARAMETER_BYTE_ARRAY:
+        native = b''.join(native)
+    elif not isinstance(native, bool | int | float | str | None):
+        native = list(native)
+    if native is not None:
+        yield Parameter(name, value=native)
+
+
+def _fit(value: Any, type_number: int | None) -> Any:
+    """Return a value as the parameter has it: clients send whole numbers as integers."""
+    if isinstance(value, bytes):
+        return [bytes([each]) for each in value]
+    if type_number == ParameterType.PARAMETER_DOUBLE and isinstance(value, int):
+        return float(value)
+    if type_number == ParameterType.PARAMETER_DOUBLE_ARRAY and isinstance(value, list):
+        return list(map(float, value))
+    return value

@@ -1,0 +1,283 @@
+"""Foxglove's protocol, spoken by a client of its own to a system that runs."""
+
+import json
+import re
+import struct
+import time
+from contextlib import ExitStack, contextmanager
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('foxglove')
+pytest.importorskip('websockets')
+
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Int64, String
+from std_srvs.srv import SetBool
+from websockets.sync.client import connect
+
+from composer.cli.main import run
+from tests.running import wait_for
+
+pytestmark = pytest.mark.ros
+
+PATIENCE_SEC = 15.0
+SYSTEM = """
+version: 1
+diagnostics: {period: 0.2}
+workers: {other: {}}
+nodes:
+  talker:
+    parameters: {speed: 1.5, gains: [1.0, 2.0], mode: slow}
+    publishers:
+      count: {type: std_msgs/msg/Int64}
+      map: {type: std_msgs/msg/String, qos: {durability: transient_local}}
+      big: {type: std_msgs/msg/String}
+    timers:
+      tick: {rate: 50, behaviour: parts:tick, publish: count, group: own}
+      grow: {rate: 10, behaviour: parts:grow, publish: big}
+    on_start: parts:draw
+    services: {switch: {type: std_srvs/srv/SetBool, behaviour: parts:switch}}
+  hearer:
+    subscriptions:
+      count: {type: std_msgs/msg/Int64, behaviour: parts:hear}
+      said: {type: std_msgs/msg/String, external: true, behaviour: parts:repeat}
+  far:
+    worker: other
+    publishers: {far: {type: std_msgs/msg/Int64, external: true}}
+    timers: {tick: {rate: 20, behaviour: parts:tick, publish: far}}
+"""
+CODE = """
+def tick(node):
+    node.state.count = getattr(node.state, 'count', 0) + 1
+    return node.state.count
+
+def grow(node):
+    return 'x' * 1_000_000
+
+def draw(node):
+    node.publish('map', {'data': 'the map'})
+
+def switch(node, request):
+    return {'success': not request.data, 'message': f'was {request.data}'}
+
+def hear(node, message):
+    pass
+
+def repeat(node, message):
+    print(f'heard {message.data}')
+"""
+
+
+class Foxglove:
+    """A client that has all that came, by the kind."""
+
+    def __init__(self, socket):
+        self.socket = socket
+        self.channels, self.services = {}, {}
+        self.seen = []
+        self.data = {}
+
+    def send(self, op, **fields):
+        self.socket.send(json.dumps({'op': op, **fields}))
+
+    def take(self, timeout_sec=0.1):
+        try:
+            came = self.socket.recv(timeout_sec)
+        except TimeoutError:
+            return
+        if isinstance(came, bytes):
+            kind, number = struct.unpack_from('<BI', came)
+            self.data.setdefault((kind, number), []).append(came[5:])
+            return
+        document = json.loads(came)
+        self.seen.append(document)
+        self.channels |= {each['topic']: each for each in document.get('channels', ())}
+        if document['op'] == 'advertiseServices':
+            self.services |= {each['name']: each for each in document['services']}
+
+    def wait_for(self, condition, what):
+        def arrived():
+            self.take()
+            return condition()
+
+        return wait_for(arrived, what, PATIENCE_SEC)
+
+    def wait_for_op(self, op, condition=lambda _: True):
+        return self.wait_for(
+            lambda: next((s for s in self.seen if s['op'] == op and condition(s)), None), op
+        )
+
+    def subscribe(self, topic, number):
+        self.wait_for(lambda: topic in self.channels, topic)
+        ids = {'id': number, 'channelId': self.channels[topic]['id']}
+        self.send('subscribe', subscriptions=[ids])
+
+    def messages(self, number, message_class, count=1):
+        self.wait_for(lambda: len(self.data.get((1, number), ())) >= count, f'{count} messages')
+        # After the number is the time.
+        return [deserialize_message(each[8:], message_class) for each in self.data[1, number]]
+
+    def parameters(self, *names):
+        self.seen.clear()
+        self.send('getParameters', parameterNames=names, id='get')
+        answer = self.wait_for_op('parameterValues')
+        return {each['name']: each['value'] for each in answer['parameters']}
+
+    def call(self, service, request):
+        self.wait_for(lambda: service in self.services, service)
+        number = self.services[service]['id']
+        head = struct.pack('<BIII', 2, number, 1, 3)
+        self.socket.send(head + b'cdr' + serialize_message(request))
+        (answer,) = self.wait_for(lambda: self.data.get((3, number)), 'the response')
+        return deserialize_message(answer[11:], SetBool.Response)
+
+
+@contextmanager
+def connected(port, **options):
+    url, protocols = f'ws://127.0.0.1:{port}', ['foxglove.sdk.v1']
+    with connect(url, subprotocols=protocols, max_size=None, **options) as socket:
+        yield Foxglove(socket)
+
+
+def port_of(system):
+    return int(re.search(r'ws://127\.0\.0\.1:(\d+)', system.output)[1])
+
+
+@pytest.fixture
+def start(compose):
+    def start(*options):
+        system = compose(SYSTEM, CODE, '--foxglove', '0', *options)
+        system.wait_until_ready()
+        return system, port_of(system)
+
+    return start
+
+
+def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(start, peer, capsys):
+    system, port = start()
+    sender = peer.run(peer.node.create_publisher, String, '/outside', 10)
+    with connected(port) as one, connected(port) as two:
+        one.subscribe('/count', 1)
+        one.subscribe('/map', 2)
+        one.subscribe('/far', 3)
+        one.subscribe('/outside', 4)
+        numbers = [message.data for message in one.messages(1, Int64, count=20)]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert one.messages(2, String)[0].data == 'the map'
+        assert len(one.messages(3, Int64, count=5)) >= 5
+        wait_for(sender.get_subscription_count, 'the bridge')
+        sender.publish(String(data='hello'))
+        assert one.messages(4, String)[0].data == 'hello'
+        # A latched message comes to who is later, too.
+        two.subscribe('/map', 2)
+        assert two.messages(2, String)[0].data == 'the map'
+        # What was handed over still is.
+        assert run(['top', '--once', '--format', 'json']) == 0
+        entities = json.loads(capsys.readouterr().out)['entities']
+        ways = {(each['kind'], each['name']): each['delivery'] for each in entities}
+        assert ways['publisher', 'count'] == 'local'
+        schema = one.channels['/count']
+        assert (schema['schemaName'], schema['schemaEncoding']) == (
+            'std_msgs/msg/Int64',
+            'ros2msg',
+        )
+        assert 'int64 data' in schema['schema']
+        one.send('unsubscribe', subscriptionIds=[4])
+        wait_for(lambda: not sender.get_subscription_count(), 'the end of the subscription')
+    assert system.stop() == 0
+    assert not system.matching('ERROR')
+
+
+def test_clients_change_the_system_where_they_may(start):
+    system, port = start('--allow-changes')
+    with connected(port) as one:
+        names = ('/talker.speed', '/talker.gains', '/talker.mode')
+        assert one.parameters(*names) == dict(zip(names, (1.5, [1.0, 2.0], 'slow'), strict=True))
+        assert set(names) <= one.parameters().keys()
+        one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
+        new = {'/talker.speed': 3, '/talker.gains': [4], '/talker.mode': 'fast', '/talker.no': 1}
+        parameters = [{'name': name, 'value': value} for name, value in new.items()]
+        one.send('setParameters', parameters=parameters, id='set')
+        refusal = one.wait_for_op('status')
+        assert refusal['message'].startswith('/talker.no was not set: ')
+        assert one.parameters(*names) == dict(zip(names, (3.0, [4.0], 'fast'), strict=True))
+        response = one.call('/switch', SetBool.Request(data=True))
+        assert (response.success, response.message) == (False, 'was True')
+        channel = {
+            'id': 9,
+            'topic': '/said',
+            'encoding': 'cdr',
+            'schemaName': 'std_msgs/msg/String',
+        }
+        one.send('advertise', channels=[channel])
+        data = struct.pack('<BI', 1, 9) + serialize_message(String(data='this'))
+        deadline = time.monotonic() + PATIENCE_SEC
+        while not system.matching('heard this') and time.monotonic() < deadline:
+            # The first may come before the subscription has met the publisher.
+            one.socket.send(data)
+            one.take()
+        assert system.matching('heard this')
+        one.send('subscribeConnectionGraph')
+        graph = one.wait_for_op('connectionGraphUpdate', lambda each: each['publishedTopics'])
+        published = {each['name']: each['publisherIds'] for each in graph['publishedTopics']}
+        heard = {each['name']: each['subscriberIds'] for each in graph['subscribedTopics']}
+        served = {each['name']: each['providerIds'] for each in graph['advertisedServices']}
+        assert published['/count'] == ['/talker']
+        assert heard['/count'] == ['/hearer']
+        assert served['/switch'] == ['/talker']
+        assert published['/far'] == ['/far']
+
+
+def test_clients_change_nothing_otherwise(start):
+    _, port = start()
+    with connected(port) as one:
+        one.send('setParameters', parameters=[{'name': '/talker.mode', 'value': 'fast'}], id='x')
+        status = one.wait_for_op('status')
+        assert status['message'] == 'parameters are set only with --allow-changes'
+        assert one.parameters('/talker.mode') == {'/talker.mode': 'slow'}
+        info = one.seen or [one.wait_for_op('serverInfo')]
+        assert not one.services, info
+
+
+def test_who_does_not_read_holds_nobody_up(start):
+    system, port = start()
+    with ExitStack() as stack:
+        # It takes nothing more from the kernel than fits its queue.
+        mute = stack.enter_context(connected(port, max_queue=1))
+        mute.subscribe('/count', 1)
+        mute.subscribe('/big', 2)
+        for _ in range(10):
+            with ExitStack() as short:
+                for one in [short.enter_context(connected(port)) for _ in range(20)]:
+                    one.subscribe('/count', 1)
+        last = stack.enter_context(connected(port))
+        last.subscribe('/count', 1)
+        numbers = [message.data for message in last.messages(1, Int64, count=100)]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert system.stop() == 0
+    assert not system.matching('ERROR')
+
+
+def test_a_system_that_runs_is_shown_from_beside_it(compose, capsys):
+    system = compose(SYSTEM, CODE)
+    system.wait_until_ready()
+    assert run(['foxglove', 'nobody', '--port', '0']) == 1
+    capsys.readouterr()
+    beside = compose.start('foxglove', '--port', '0')
+    beside.wait_for_line('ws://')
+    with connected(port_of(beside)) as one:
+        one.subscribe('/count', 1)
+        assert len(one.messages(1, Int64, count=10)) >= 10
+        assert one.parameters('/talker.mode') == {'/talker.mode': 'slow'}
+    assert beside.stop() == 0
+
+
+def test_a_port_that_is_taken_is_told(start, compose, capsys):
+    _, port = start()
+    other = compose.run(compose.write(SYSTEM, CODE, 'second').name, '--foxglove', str(port))
+    assert other.wait() == 1
+    assert f'error: Foxglove cannot be served at 127.0.0.1:{port}' in other.output
+    assert run(['up', str(compose.folder / 'system.yaml'), '--allow-changes']) == 2
+    assert 'are for --foxglove' in capsys.readouterr().err
