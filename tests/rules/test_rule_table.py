@@ -42,6 +42,7 @@ NO_RULES = {
     'system-out',
     'system-err',
     'rclpy-composer',
+    'send-goal',
 }
 # Names of which the code has one half, and a table the other.
 COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
