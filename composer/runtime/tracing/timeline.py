@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from composer.runtime.tracing.tracer import MARKS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from composer.runtime.tracing.tracer import TracePart
 
@@ -41,7 +41,7 @@ class _Slice:
     begun_ns: int
     ended_ns: int
     value: int
-    arrows: Sequence[tuple[int, int]]
+    arrows: list[int] = field(default_factory=list)
     place: dict[str, int] = field(default_factory=dict)
     cause: _Slice | None = None
     first: _Slice | None = None
@@ -60,12 +60,18 @@ class Timeline:
     def __init__(self, parts: Mapping[str, TracePart]) -> None:
         self._parts = parts
         self._begun_ns = min((part.begun_ns for part in parts.values()), default=0)
-        self._slices = [
-            _Slice(name, *event) for name, part in parts.items() for event in part.events
-        ]
-        for each in self._slices:
-            if each.arrows:
-                each.ended_ns = each.arrows[-1][1]
+        events = [_Slice(name, *event) for name, part in parts.items() for event in part.events]
+        self._slices = [each for each in events if each.kind != 'arrow']
+        published = {
+            (each.part, each.track, each.begun_ns): each
+            for each in self._slices
+            if each.kind == 'publish'
+        }
+        for each in events:
+            begin = published.get((each.part, each.track, each.begun_ns))
+            if each.kind == 'arrow' and begin is not None:
+                begin.arrows.append(each.value)
+                begin.ended_ns = each.ended_ns
         self._slices.sort(key=lambda each: (each.begun_ns, -each.ended_ns))
         self._pids: dict[tuple[str, str], int] = {}
         self._tids: dict[tuple[int, str], int] = {}
@@ -111,7 +117,7 @@ class Timeline:
                 # Which of several coroutines it was, nobody knows.
                 if len(lasting) == 1:
                     each.cause = lasting[0]
-                    senders.update(((each.part, arrow), lasting[0]) for arrow, _ in each.arrows)
+                    senders.update(((each.part, arrow), lasting[0]) for arrow in each.arrows)
 
     def render(self) -> str:
         """Return the file."""
@@ -127,7 +133,7 @@ class Timeline:
             yield {'ph': 'M', 'name': 'thread_name', 'pid': pid, 'tid': tid, 'args': args}
 
     def _render_slices(self) -> Iterator[dict[str, Any]]:
-        begun = {(each.part, arrow) for each in self._slices for arrow, _ in each.arrows}
+        begun = {(each.part, arrow) for each in self._slices for arrow in each.arrows}
         ended = {(each.part, each.value) for each in self._slices if each.kind == 'callback'}
         numbers = {key: number for number, key in enumerate(sorted(begun & ended), 1)}
         for each in self._slices:
@@ -147,7 +153,7 @@ class Timeline:
                 args = {'node': each.node}
                 yield {**common, 'ph': 'X', 'dur': duration_ns / _NS_PER_US, 'args': args}
                 # An arrow belongs to the slice before it in the file.
-                ends = [('s', arrow) for arrow, _ in each.arrows] + [('f', each.value)]
+                ends = [('s', arrow) for arrow in each.arrows] + [('f', each.value)]
                 for ph, arrow in ends:
                     if number := numbers.get((each.part, arrow)):
                         named = {'cat': 'message', 'name': 'message', 'id': number}

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import itertools
+import math
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import get_ident
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
     from composer.executor.sources.inbox import Inbox
     from composer.runtime.behaviours.running_calls import RunningCalls
 
 EventKind: TypeAlias = Literal[
-    'callback', 'publish', 'call', 'wait', 'goal', 'queue', 'dropped', 'late'
+    'callback', 'publish', 'arrow', 'call', 'wait', 'goal', 'queue', 'dropped', 'late'
 ]
-# Kind, node, track, name, begin and end (ns), value, arrows that begin in it. A track is the
-# identifier of a thread, or a word for what holds none. The value of a callback is the arrow that
-# ends in it (0 for none), of a queue its length, of a late tick by how much (ns). An arrow is its
-# number and when its message was handed over.
-TraceEvent: TypeAlias = (
-    'tuple[EventKind, str, int | str, str, int, int, int, Sequence[tuple[int, int]]]'
-)
+# Kind, node, track, name, begin and end (ns), value. A track is the identifier of a thread, or a
+# word for what holds none. The value of a callback or an arrow is the number of the arrow (0 for
+# none), of a queue its length, of a late tick by how much (ns). An arrow begins with the message
+# that its thread published at that time.
+TraceEvent: TypeAlias = 'tuple[EventKind, str, int | str, str, int, int, int]'
 
-# 100 MB.
+# Less than 100 MB.
 MOST_EVENTS: Final = 500_000
 COROUTINE: Final = 'coroutine'
 MARKS: Final = 'marks'
+_FIELDS: Final = 7
 
 
 class TracePart(NamedTuple):
@@ -61,13 +61,15 @@ class Tracer:
         self._clear()
 
     def _clear(self) -> None:
-        self._events: list[TraceEvent] = []
+        # Their fields one after the other: so many tuples would keep the garbage collector busy.
+        self._fields: list[Any] = []
         self._lost = 0
         self._last_ns = 0
         self._arrows = itertools.count(1)
         # What is handed over and not run yet, by the identity of the message.
         self._waiting: dict[int, list[tuple[int, TracedInbox]]] = {}
-        self._publications: dict[int, list[tuple[int, int]]] = {}
+        # When each thread published last.
+        self._publications: dict[int, int] = {}
 
     def turn_on(self, begun_ns: int | None = None) -> None:
         """Begin, or begin anew.
@@ -86,13 +88,19 @@ class Tracer:
             running: The calls that run on, with the full names of their nodes.
         """
         self.is_on = False
-        ended_ns, events = self.now_ns(), self._events
+        ended_ns, fields = self.now_ns(), iter(self._fields)
+        events: list[TraceEvent] = [
+            (kind, node, track, str(name), begun_ns, end_ns, value)
+            for kind, node, track, name, begun_ns, end_ns, value in zip(
+                *[fields] * _FIELDS, strict=True
+            )
+        ]
         for node, calls in running:
             for call in calls.calls():
                 track = COROUTINE if call.thread is None else call.thread
                 begun_ns = max(call.begun_ns, self._begun_ns)
                 name = f'{call.owner} (runs on)'
-                events.append(('callback', node, track, name, begun_ns, ended_ns, 0, ()))
+                events.append(('callback', node, track, name, begun_ns, ended_ns, 0))
         threads = {str(each.ident): each.name for each in threading.enumerate()}
         part = TracePart(self._begun_ns, ended_ns, threads, events, self._lost)
         self._clear()
@@ -115,7 +123,7 @@ class Tracer:
         now_ns, arrow = self.now_ns(), 0
         if arguments and (waiting := self._waiting.pop(id(arguments[0]), None)):
             for _, inbox in waiting:
-                self._add(('queue', *inbox.place, now_ns, now_ns, len(inbox.messages), ()))
+                self._add(('queue', *inbox.place, now_ns, now_ns, len(inbox.messages)))
             arrow, _ = waiting.pop()
             if waiting:
                 # Others share the message.
@@ -134,7 +142,7 @@ class Tracer:
         begun_ns, arrow = begun
         if begun_ns >= self._begun_ns:
             place = track or get_ident()
-            self._add((kind, node, place, str(name), begun_ns, self.now_ns(), arrow, ()))
+            self._add((kind, node, place, name, begun_ns, self.now_ns(), arrow))
 
     @contextmanager
     def waiting(self, node: str, what: str, track: str = '') -> Iterator[None]:
@@ -149,37 +157,48 @@ class Tracer:
     def note(self, kind: EventKind, node: str, name: str, value: int) -> None:
         """Note a length, or that something was dropped or late."""
         now_ns = self.now_ns()
-        self._add((kind, node, MARKS, name, now_ns, now_ns, value, ()))
+        self._add((kind, node, MARKS, name, now_ns, now_ns, value))
 
-    def _add(self, event: TraceEvent) -> None:
-        if len(self._events) < MOST_EVENTS:
-            self._events.append(event)
+    def _add(self, event: tuple[Any, ...]) -> None:
+        if len(self._fields) < MOST_EVENTS * _FIELDS:
+            self._fields += event
         else:
-            self._lost += 1
+            self._lost += len(event) // _FIELDS
 
     def create_tap(self, node: str, topic: str) -> Callable[[Any], None]:
         """Return what notes a message that is published."""
 
         def tap(_message: Any) -> None:
             thread, now_ns = get_ident(), self.now_ns()
-            arrows: list[tuple[int, int]] = []
-            self._publications[thread] = arrows
-            self._add(('publish', node, thread, topic, now_ns, now_ns, 0, arrows))
+            self._publications[thread] = now_ns
+            self._add(('publish', node, thread, topic, now_ns, now_ns, 0))
 
         return tap
 
     def hand_over(self, message: Any, inbox: TracedInbox) -> None:
         """Note that what this thread publishes comes into a queue now."""
-        arrows = self._publications.get(get_ident())
-        if self.is_on and arrows is not None:
-            now_ns, arrow, length = self.now_ns(), next(self._arrows), len(inbox.messages)
-            arrows.append((arrow, now_ns))
-            if length == inbox.messages.maxlen:
-                self._waiting.pop(id(inbox.messages[0]), None)
-                self._add(('dropped', *inbox.place, now_ns, now_ns, 1, ()))
-                length -= 1
-            self._waiting.setdefault(id(message), []).append((arrow, inbox))
-            self._add(('queue', *inbox.place, now_ns, now_ns, length + 1, ()))
+        thread = get_ident()
+        begun_ns = self._publications.get(thread)
+        if not self.is_on or begun_ns is None:
+            return
+        messages, (node, track, topic) = inbox.messages, inbox.place
+        now_ns, arrow, length = self.now_ns(), next(self._arrows), len(messages) + 1
+        if length > inbox.most:
+            length -= 1
+            with suppress(IndexError):  # Another thread was faster.
+                self._waiting.pop(id(messages[0]), None)
+            self._add(('dropped', node, track, topic, now_ns, now_ns, 1))
+        if (waiting := self._waiting.get(id(message))) is None:
+            self._waiting[id(message)] = [(arrow, inbox)]
+        else:
+            waiting.append((arrow, inbox))
+        # Two events at once.
+        self._add(
+            (
+                *('arrow', node, thread, topic, begun_ns, now_ns, arrow),
+                *('queue', node, track, topic, now_ns, now_ns, length),
+            )
+        )
 
 
 class TracedInbox:
@@ -190,11 +209,13 @@ class TracedInbox:
 
     Attributes:
         messages: Those of the queue.
+        most: How many it holds.
         place: Node, track and name of its length.
     """
 
     def __init__(self, node: Any, ros: Any, inbox: Inbox) -> None:
         self.messages = inbox.messages
+        self.most = math.inf if inbox.depth is None else inbox.depth
         self.place = node.get_fully_qualified_name(), MARKS, ros.topic_name
         self._put = inbox.put
 
