@@ -78,6 +78,7 @@ class Names:
     def __init__(self, finder: ModuleFinder) -> None:
         self._finder = finder
         self._module_names: dict[int, str] = {}
+        self._followed: set[tuple[int, str]] = set()
         self._tops: dict[int, TopNames] = {}
         self._stored: dict[int, dict[str, list[_Stored]]] = {}
         self._members: dict[int, _Members] = {}
@@ -215,7 +216,15 @@ class Names:
             return None
         if (len(statements) > 1 or is_conditional) and not is_import:
             return None
-        return self._top_value(module, statement, name)
+        key = id(module), name
+        # Modules may import a name of each other.
+        if key in self._followed:
+            return None
+        self._followed.add(key)
+        try:
+            return self._top_value(module, statement, name)
+        finally:
+            self._followed.discard(key)
 
     def _top_value(self, module: ModuleSource, statement: ast.AST, name: str) -> Value | None:
         match statement:

@@ -74,7 +74,7 @@ processes:
 def test_variables_of_processes_are_in_no_drawing(project, capsys):
     (project / 'a.yaml').write_text(PROCESSES)
 
-    for name in ('json', 'mermaid', 'dot', 'html'):
+    for name in ('json', 'mermaid', 'dot'):
         assert (
             run(['graph', 'a.yaml', '--format', name, '--set', 'processes.two.env.C=literal']) == 0
         )
@@ -98,7 +98,7 @@ def test_names_from_the_environment_are_in_no_drawing(project, monkeypatch, caps
     monkeypatch.setenv('PIN', '73519')
     (project / 'a.yaml').write_text(NAMES)
 
-    for name in ('json', 'mermaid', 'dot', 'html'):
+    for name in ('json', 'mermaid', 'dot'):
         assert run(['graph', 'a.yaml', '--format', name]) == 0
         shown = capsys.readouterr().out
         assert 'env(' in shown

@@ -125,6 +125,7 @@ def composer_accepts(data):
     others = {
         'bad-node-interface',
         'bad-argument-declaration',
+        'bad-name',
         'bad-variable',
         'missing-include',
         'unknown-qos-profile',

@@ -254,10 +254,10 @@ def _names(kind: str) -> Callable[..., Any]:
 def echo_command(
     topic: str, field: str, timeout_sec: float, *, once: bool, tells_rate: bool
 ) -> int:
-    """Print the messages of TOPIC, or FIELD of each, until it is interrupted.
+    """Print the messages of TOPIC, or FIELD of each.
 
-    FIELD is a part of the message, as pose.position.x or ranges[0]. With --once, the exit code is
-    1 if no message comes in time.
+    It goes on until it is interrupted. FIELD is a part of the message, as pose.position.x or
+    ranges[0]. With --once, the exit code is 1 if no message comes in time.
     """
     from composer.cli.running.live_values import echo
 
@@ -284,10 +284,10 @@ def call_command(service: str, payload: str, timeout_sec: float) -> int:
 @click.argument('payload', default='')
 @_answer_timeout
 def send_goal_command(action: str, payload: str, timeout_sec: float) -> int:
-    """Send the goal PAYLOAD to ACTION, and print its feedback and result.
+    """Send a goal to ACTION, and print its result.
 
-    The result may take as long as it likes; Ctrl-C cancels the goal. If it does not succeed, the
-    exit code is 1.
+    PAYLOAD is YAML, as for 'composer call'. Feedback is printed, too. The result may take as long
+    as it likes; Ctrl-C cancels the goal. If it does not succeed, the exit code is 1.
     """
     from composer.cli.running.live_values import send_goal
 
