@@ -21,13 +21,14 @@ from composer.node_uses.values import (
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.local_names import list_arguments, nested_names, stored_names
-from composer.python_source.modules import MOST_BASES, ModuleSource
+from composer.python_source.modules import MOST_BASES, FunctionSource, ModuleSource
 from composer.python_source.syntax import FunctionNode, list_children
 from composer.python_source.top_names import TopNames
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from composer.python_source.function_kinds import FunctionKind
     from composer.python_source.module_finder import ModuleFinder
 
 # The classes whose objects threads wait for, by the name of the class that waits alike.
@@ -79,6 +80,10 @@ class Names:
         self._finder = finder
         self._module_names: dict[int, str] = {}
         self._followed: set[tuple[int, str]] = set()
+        # By the definition, which stays as long as its module.
+        self._kinds: dict[int, FunctionKind | None] = {}
+        # How many expressions were walked through.
+        self.walked = 0
         self._tops: dict[int, TopNames] = {}
         self._stored: dict[int, dict[str, list[_Stored]]] = {}
         self._members: dict[int, _Members] = {}
@@ -89,6 +94,12 @@ class Names:
         if id(module) not in self._tops:
             self._tops[id(module)] = TopNames(module.body)
         return self._tops[id(module)]
+
+    def kind_of(self, definition: FunctionNode) -> FunctionKind | None:
+        """Return what a function returns; reading all of it takes its time."""
+        if id(definition) not in self._kinds:
+            self._kinds[id(definition)] = FunctionSource(definition).kind
+        return self._kinds[id(definition)]
 
     def find_module(self, name: str) -> ModuleSource | None:
         """Return a module of the project, if it is one and can be read."""

@@ -21,7 +21,7 @@ from composer.node_uses.values import (
     Value,
 )
 from composer.python_source.local_names import list_arguments
-from composer.python_source.modules import FunctionSource, read_signature
+from composer.python_source.modules import read_signature
 from composer.python_source.places import span_of
 from composer.python_source.syntax import list_children
 from composer.spelling import suggest
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _DEEPEST = 5
 # What one behaviour may take: an expression is a step.
 _MOST_STEPS = 30_000
+# Those of all behaviours that are read together.
+_MOST_STEPS_IN_ALL = 600_000
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _TESTS = frozenset(
     {'callable', 'get_fields_and_field_types', 'getattr', 'hasattr', 'isinstance', 'type'}
@@ -379,14 +381,14 @@ class Walk:
             case Chain(path=('node', 'call_async') | ('goal', _, 'result_async')):
                 return True
             case Function(definition=ast.AsyncFunctionDef() as definition):
-                kind = FunctionSource(definition).kind
+                kind = self._names.kind_of(definition)
                 return kind is not None and not kind.is_generator
         return False
 
     def _is_generator(self, func: ast.expr, scope: Scope) -> bool:
         match self._names.value_of(func, scope):
             case Function(definition=ast.FunctionDef() as definition):
-                kind = FunctionSource(definition).kind
+                kind = self._names.kind_of(definition)
                 return kind is not None and kind.is_generator
         return False
 
@@ -474,7 +476,8 @@ class Walk:
             TooLongError: There were too many.
         """
         self._steps += 1
-        if self._steps > _MOST_STEPS:
+        self._names.walked += 1
+        if self._steps > _MOST_STEPS or self._names.walked > _MOST_STEPS_IN_ALL:
             raise TooLongError
         match node:
             case ast.Name() | ast.Attribute() | ast.Subscript():

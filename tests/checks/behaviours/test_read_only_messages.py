@@ -78,10 +78,6 @@ WRITES = [
             scan.range_max = 2.0
         except Exception:
             pass""",
-    """scan:
-        match scan:
-            case LaserScan() as other:
-                other.range_max = 2.0""",
     'poses: poses.poses[0].position.x = 1.0',
     'poses: poses.poses.sort(key=str)',
     'poses: poses.poses.insert(0, Pose())',
