@@ -137,14 +137,16 @@ class NodeChange:
             transaction.on_commit(node.forget, operation.noun, name)
 
     def _change_back(self, noun: str, spec: Any, entity: LiveEntity) -> None:
-        # Its behaviours are bound now, and the record of the node comes back later.
-        self._node.functions = self._old.functions
+        self._bind_as_before()
         self._node.change(noun, spec, entity)
 
     def _ask_as_before(self, parameters: NodeParameters) -> None:
-        # As above.
-        self._node.functions = self._old.functions
+        self._bind_as_before()
         parameters.ask(self._before)
+
+    def _bind_as_before(self) -> None:
+        # Behaviours are bound, and limits are read, before the rest of the record comes back.
+        self._node.spec, self._node.functions = self._before, self._old.functions
 
     def _create(self, target: Target, spec: Any) -> LiveEntity:
         """Create an entity; one whose topic gets another type when the old ends have gone."""
