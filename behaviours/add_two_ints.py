@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer import ServiceNotAvailableError
+from composer import CallTimeoutError, ServiceNotAvailableError
 
 if TYPE_CHECKING:
     from example_interfaces.srv import AddTwoInts
@@ -28,5 +28,7 @@ def ask(node: Node, a: int, b: int) -> None:
             break
         except ServiceNotAvailableError:
             node.logger.info('service not available, waiting again...')
+        except CallTimeoutError:
+            node.logger.info('no answer, asking again...')
     node.logger.info(f'Result of add_two_ints: for {a} + {b} = {response.sum}')
     node.shutdown()
