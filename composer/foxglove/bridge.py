@@ -5,7 +5,9 @@ Messages are taken as a recording takes them: see `SystemRecorder`.
 
 from __future__ import annotations
 
+import json
 import queue
+import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
@@ -14,6 +16,9 @@ from typing import TYPE_CHECKING, Any, Final
 import foxglove
 from foxglove.websocket import Capability, ServerListener
 from rclpy.exceptions import InvalidHandle
+from websockets import Subprotocol
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import connect
 
 from composer.errors import ComposerError, StartError
 from composer.foxglove.graph_access import GraphAccess
@@ -41,6 +46,9 @@ _BURST_SEC: Final = 0.02
 _BACKLOG: Final = 256
 _HIDDEN: Final = '/_'
 _LISTENER: Final = '_composer_foxglove_listener'
+_PROTOCOL: Final = 'foxglove.sdk.v1'
+_ANY: Final = ('0.0.0.0', '::', '')  # noqa: S104 - how each address is written
+_LOOPBACK: Final = 'localhost'
 
 
 @record
@@ -73,11 +81,13 @@ class FoxgloveBridge(ServerListener):
         self.queue: Any = self
         self._log = log
         self._allows_changes = options.allows_changes
+        self._address = _LOOPBACK if options.address in _ANY else options.address
         self._sink = foxglove.Context()
         self._channels: dict[tuple[str, str], _Channel] = {}
         self._services: set[str] = set()
         self._wanted: Counter[str] = Counter()
-        self._shows_graph = threading.Event()
+        self._watches_graph = threading.Event()
+        self._may_show_graph = threading.Event()
         # What the threads of the server tell; they may hold its locks.
         self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._ended = threading.Event()
@@ -209,7 +219,7 @@ class FoxgloveBridge(ServerListener):
             self._channels.pop(key).base.close()
         if self._allows_changes:
             self._show_services()
-        if self._shows_graph.is_set():
+        if self._may_show_graph.is_set():
             self._access.show_graph({topic for topic, _ in topics})
 
     def _show_services(self) -> None:
@@ -244,14 +254,34 @@ class FoxgloveBridge(ServerListener):
             self._told.put(channel.topic)
 
     def on_connection_graph_subscribe(self) -> None:
-        """Show the graph, at once and when it changes."""
-        self._access.graph = None
-        self._shows_graph.set()
-        self._told.put('')
+        """Show the graph, soon and when it changes."""
+        if not self._watches_graph.is_set():
+            self._watches_graph.set()
+            threading.Thread(target=self._watch_graph, name='composer-graph', daemon=True).start()
 
-    def on_connection_graph_unsubscribe(self) -> None:
-        """Show it no more."""
-        self._shows_graph.clear()
+    def _watch_graph(self) -> None:
+        """Subscribe to the graph as a client, and let it be shown for as long.
+
+        The server tells of the first subscription and of the end of the last one with a lock held,
+        for which the publication of the graph waits with the interpreter held: for ever, if both
+        happen at a time. While this subscription is there, no other one is the first or the last.
+        """
+        with (
+            suppress(OSError, WebSocketException),
+            connect(
+                'ws://localhost',
+                sock=socket.create_connection((self._address, self._server.port)),
+                subprotocols=[Subprotocol(_PROTOCOL)],
+                compression=None,
+                max_size=None,
+            ) as connection,
+        ):
+            connection.send(json.dumps({'op': 'subscribeConnectionGraph'}))
+            for message in connection:
+                if isinstance(message, str) and '"connectionGraphUpdate"' in message:
+                    self._may_show_graph.set()
+        self._may_show_graph.clear()
+        self._watches_graph.clear()
 
     def on_get_parameters(
         self, _client: Client, param_names: list[str], request_id: str | None = None
@@ -270,14 +300,6 @@ class FoxgloveBridge(ServerListener):
         else:
             self._access.refuse('parameters are set only with --allow-changes')
         return self._access.get_parameters([each.name for each in parameters])
-
-    def on_parameters_subscribe(self, param_names: list[str]) -> None:
-        """Send these when they change."""
-        self._access.follow_parameters(param_names)
-
-    def on_parameters_unsubscribe(self, param_names: list[str]) -> None:
-        """Send these no more."""
-        self._access.followed.difference_update(param_names)
 
     def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
         """Have a publisher for a client."""

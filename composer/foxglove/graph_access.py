@@ -17,7 +17,7 @@ from foxglove.websocket import (
     ServiceSchema,
     StatusLevel,
 )
-from rcl_interfaces.msg import ParameterEvent, ParameterType
+from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter import Parameter as RosParameter
@@ -43,7 +43,6 @@ class GraphAccess:
     """A node that acts for clients; an executor spins it.
 
     Attributes:
-        followed: The names of the parameters that clients want to be told of.
         graph: What clients were shown of it; `None` for nothing.
     """
 
@@ -53,9 +52,7 @@ class GraphAccess:
         self._clients: dict[str, Any] = {}
         self._publishers: dict[tuple[int, int], Any] = {}
         self._lock = threading.Lock()
-        self.followed: set[str] = set()
         self.graph: Any = None
-        self._events: Any = None
 
     def refuse(self, reason: str) -> None:
         """Show clients why something is not done."""
@@ -151,24 +148,6 @@ class GraphAccess:
             for name, result in zip(values, response.results, strict=True):
                 if not result.successful:
                     self.refuse(f'{node}.{name} was not set: {result.reason}')
-
-    def follow_parameters(self, names: Iterable[str]) -> None:
-        """Send these to clients when they change."""
-        self.followed.update(names)
-        if self._events is None:
-            self._events = self._node.create_subscription(
-                ParameterEvent, '/parameter_events', self._take_event, 100
-            )
-
-    def _take_event(self, event: ParameterEvent) -> None:
-        changed = [
-            parameter
-            for each in (*event.new_parameters, *event.changed_parameters)
-            if (name := f'{event.node}.{each.name}') in self.followed
-            for parameter in _show(name, each.value)
-        ]
-        if changed:
-            self._server.publish_parameter_values(changed)
 
     def create_service(
         self, name: str, type_name: str, create_schema: Callable[[type], Any]

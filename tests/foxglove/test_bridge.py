@@ -281,3 +281,13 @@ def test_a_port_that_is_taken_is_told(start, compose, capsys):
     assert f'error: Foxglove cannot be served at 127.0.0.1:{port}' in other.output
     assert run(['up', str(compose.folder / 'system.yaml'), '--allow-changes']) == 2
     assert 'are for --foxglove' in capsys.readouterr().err
+
+
+def test_who_looks_at_the_graph_and_leaves_holds_nobody_up(start):
+    system, port = start()
+    for _ in range(150):
+        with connected(port) as one:
+            one.send('subscribeConnectionGraph')
+            one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
+            one.wait_for_op('connectionGraphUpdate')
+    assert system.stop() == 0

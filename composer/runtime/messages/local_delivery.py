@@ -143,8 +143,9 @@ class LocalPublisher:
             is_held: Whether somebody refers to it.
         """
         self.published += 1
-        if self.tap is not None:
-            self.tap(message)
+        # A client that leaves takes it away, in another thread.
+        if (tap := self.tap) is not None:
+            tap(message)
         if self.reason:
             self._send(message)
         elif (
