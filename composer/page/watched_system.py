@@ -60,8 +60,7 @@ class DrawnFiles:
     Attributes:
         state: What the page shows, but for the drawing.
         drawing: See `describe_drawing`; empty for none.
-        changes: Counts the changes of both.
-        changed: Called after each change.
+        changed: Called after each change of one of them.
     """
 
     def __init__(
@@ -70,7 +69,6 @@ class DrawnFiles:
         self.drawing: dict[str, Any] = draw_files(paths, words, set_values)
         self.state: dict[str, Any] = {'name': self.drawing['name'], 'runs': False, 'drawing': 1}
         self.log: deque[dict[str, Any]] = deque()
-        self.changes = 1
         self.changed: Callable[[], object] = lambda: None
 
     def start(self) -> None:
@@ -79,9 +77,9 @@ class DrawnFiles:
     def stop(self) -> None:
         """There is nothing to end."""
 
-    def ask(self, _question: Callable[[Any], Any], _future: Future[Any]) -> None:
+    def ask(self, _question: Callable[[Any], Any], future: Future[Any]) -> None:
         """Nobody answers."""
-        _future.set_exception(ComposerError('the system does not run'))
+        future.set_exception(ComposerError('the system does not run'))
 
 
 class WatchedSystem:
@@ -96,7 +94,6 @@ class WatchedSystem:
         self.drawing: dict[str, Any] = {}
         self.state: dict[str, Any] = {'name': name or '', 'runs': False}
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
-        self.changes = 0
         self.changed: Callable[[], object] = lambda: None
         self._lines = 0
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
@@ -216,5 +213,4 @@ class WatchedSystem:
 
     def _tell(self, state: dict[str, Any]) -> None:
         self.state = state
-        self.changes += 1
         self.changed()
