@@ -6,11 +6,13 @@ Messages are taken as a recording takes them: see `SystemRecorder`.
 from __future__ import annotations
 
 import json
+import os
 import queue
 import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import foxglove
@@ -42,8 +44,10 @@ if TYPE_CHECKING:
 _LOOK_SEC: Final = 1.0
 _STOP_SEC: Final = 2.0
 _BURST_SEC: Final = 0.02
-# For a client that does not read; older messages are dropped then.
+# For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
+# A client that takes nothing for so long is disconnected.
+_STALL_MS: Final = 5000
 _HIDDEN: Final = '/_'
 _LISTENER: Final = '_composer_foxglove_listener'
 _PROTOCOL: Final = 'foxglove.sdk.v1'
@@ -109,6 +113,7 @@ class FoxgloveBridge(ServerListener):
         except (OSError, RuntimeError, ValueError) as error:
             message = f'Foxglove cannot be served at {options.address}:{options.port}: {error}'
             raise StartError(message, help='--foxglove 0 takes any port that is free') from error
+        _limit_stalls(self._server.port)
         log.info(f'Foxglove: open ws://{options.address}:{self._server.port}')
         self._recorder = SystemRecorder(self, self, log.warning, _LISTENER, is_late=True)
         self._thread = threading.Thread(target=self._run, name='composer-foxglove', daemon=True)
@@ -312,3 +317,21 @@ class FoxgloveBridge(ServerListener):
     def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
         """Publish a message of a client."""
         self._access.publish((client.id, client_channel_id), data)
+
+
+def _limit_stalls(port: int) -> None:
+    """Have the kernel end connections to clients that take nothing: the SDK would keep them.
+
+    Connections inherit the limit from the socket that listens.
+
+    Source: TCP_USER_TIMEOUT in https://man7.org/linux/man-pages/man7/tcp.7.html
+    """
+    for path in Path('/proc/self/fd').iterdir():
+        with suppress(OSError):
+            if not path.is_socket():
+                continue
+            with socket.socket(fileno=os.dup(int(path.name))) as found:
+                is_tcp = found.family in (socket.AF_INET, socket.AF_INET6)
+                listens = found.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+                if is_tcp and listens and found.getsockname()[1] == port:
+                    found.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)

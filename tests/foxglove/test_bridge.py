@@ -2,6 +2,7 @@
 
 import json
 import re
+import socket
 import struct
 import time
 from contextlib import ExitStack, contextmanager
@@ -141,6 +142,11 @@ def connected(port, **options):
         yield Foxglove(socket)
 
 
+def is_connected(client):
+    """Return whether the kernel still has a connection: TCP_CLOSE is 7."""
+    return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 7
+
+
 def port_of(system):
     return int(re.search(r'ws://127\.0\.0\.1:(\d+)', system.output)[1])
 
@@ -241,7 +247,7 @@ def test_clients_change_nothing_otherwise(start):
         assert not one.services, info
 
 
-def test_who_does_not_read_holds_nobody_up(start):
+def test_who_does_not_read_holds_nobody_up_and_is_disconnected(start):
     system, port = start()
     with ExitStack() as stack:
         # It takes nothing more from the kernel than fits its queue.
@@ -256,6 +262,8 @@ def test_who_does_not_read_holds_nobody_up(start):
         last.subscribe('/count', 1)
         numbers = [message.data for message in last.messages(1, Int64, count=100)]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
+        assert is_connected(last.socket.socket)
     assert system.stop() == 0
     assert not system.matching('ERROR')
 
