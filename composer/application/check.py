@@ -79,13 +79,15 @@ def check(words: Sequence[str], options: CheckOptions) -> Report:
         further['types'] = types
     files = [CheckedFile(finding.file, (finding,)) for finding in selection.findings]
     scenarios = list(selection.scenarios)
+    context = None
     for selected in selection.systems:
         if str(selected.path) == '-' and options.stdin_name.endswith(SUFFIXES):
             scenarios.append(selected.path)
             continue
         checked = []
         for given, combination, system in _load(selected, options):
-            context = create_context(system, catalogue)
+            # Systems of a project have modules in common.
+            context = create_context(system, catalogue, context)
             if context and not types.program:
                 types(context, [])
             findings = relocate(absent.leave_out(check_in_context(system, context, further)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from composer.language.bindings import node_bindings
@@ -85,7 +86,7 @@ def reach_of(node: NodeSpec, modules: Mapping[str, ProjectModule]) -> set[str]:
 
 def _read(context: CheckContext, name: str, roots: list[Path]) -> ProjectModule | None:
     source = context.modules.find(name)
-    if isinstance(source, MissingModule) or source.path is None or source.path.suffix != '.py':
+    if isinstance(source, MissingModule) or source.path is None or source.content is None:
         return None
     is_package = source.path.name == '__init__.py'
     inner = name.replace('.', '/')
@@ -93,11 +94,16 @@ def _read(context: CheckContext, name: str, roots: list[Path]) -> ProjectModule 
     if not any(root / wanted == source.path for root in roots):
         return None
     try:
-        tree = parse_source('\n'.join(source.lines).encode(), source.path)
+        tree = _parse(source.content, source.path)
     except (SyntaxError, ValueError, RecursionError, MemoryError, UnreadModuleError):
         return None
     imports = tuple(dict.fromkeys(_imported(tree, name, is_package=is_package)))
     return ProjectModule(name, source, tree, is_package, imports)
+
+
+@lru_cache(_MOST_MODULES)
+def _parse(content: bytes, path: Path) -> ast.Module:
+    return parse_source(content, path)
 
 
 def _imported(tree: ast.Module, name: str, *, is_package: bool) -> Iterator[str]:
