@@ -846,6 +846,12 @@ class SystemSpec:
         workers = _only(self.workers, lambda each: each.name == name)
         return replace(self, nodes=nodes, workers=workers, processes=MappingProxyType({}))
 
+    def nodes_named(self, name: str) -> list[str]:
+        """Return the full names of the nodes that a name means: a node's, or a worker's."""
+        named = [node for key, node in self.nodes.items() if name in (key, node.full_name)]
+        inside = [node for node in self.nodes.values() if name and node.worker == name]
+        return [node.full_name for node in named or inside]
+
     def end_owners(self) -> Iterator[NodeSpec | DeclaredNodeSpec]:
         """Yield the nodes, and those that external processes are said to have."""
         yield from self.nodes.values()

@@ -107,7 +107,7 @@ class NodeRestarter:
                 system_logger.error(text)
                 return text
             try:
-                self._build(old)
+                self.build(old)
             except ComposerError as error:
                 system_logger.error(f'restart: {error}')
                 self._system.act_on_error(full_name, 'restart')
@@ -138,14 +138,20 @@ class NodeRestarter:
         """Remove a node that hangs; only the thread of what hangs is left."""
         if self._system.stop.is_set:
             return
-        node = self._nodes.pop(full_name)
+        node = self.drop(full_name)
         self.left.append(node)
-        node.gate.close()
         system_logger.error(f"node '{node.spec.key}' hangs, and is removed: {_list_calls(node)}")
+
+    def drop(self, full_name: str) -> LiveNode:
+        """Remove a node at once, without its `on_stop`, and return it."""
+        node = self._nodes.pop(full_name)
+        node.gate.close()
         self._system.executor.remove_node(node.ros)
         node.destroy()
+        return node
 
-    def _build(self, old: LiveNode) -> None:
+    def build(self, old: LiveNode) -> None:
+        """Build a node that was removed, and start it."""
         (node,) = self._starter.create([old.spec])
         self._system.executor.add_node(node.ros)
         self._starter.run_on_start(node)

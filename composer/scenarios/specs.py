@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.language.specs import NodeSpec
+    from composer.simulation.simulated_system import NodeAction
+    from composer.simulation.topic_faults import TopicFaultKind
     from composer.yaml_text.positions import DataPath
 
 GoalStatus: TypeAlias = Literal['succeeded', 'aborted', 'canceled', 'rejected']
@@ -163,7 +165,45 @@ class SetParametersStepSpec:
     path: DataPath
 
 
-StepSpec: TypeAlias = PublishStepSpec | CallStepSpec | GoalStepSpec | SetParametersStepSpec
+@record
+class NodeStepSpec:
+    """A node, or all nodes of a worker, that a scenario stops, kills, starts or restarts.
+
+    Attributes:
+        name: As written: that of the node in the file, its full name, or that of the worker.
+    """
+
+    schedule: ScheduleSpec
+    action: NodeAction
+    name: str
+    path: DataPath
+
+
+@record
+class TopicFaultStepSpec:
+    """What happens to the messages of a topic on their way.
+
+    Attributes:
+        seconds: For how long; `None` to the end of the case.
+        delay_sec: How much later they come.
+    """
+
+    schedule: ScheduleSpec
+    kind: TopicFaultKind
+    topic: str
+    seconds: float | None
+    delay_sec: float
+    path: DataPath
+
+
+StepSpec: TypeAlias = (
+    PublishStepSpec
+    | CallStepSpec
+    | GoalStepSpec
+    | SetParametersStepSpec
+    | NodeStepSpec
+    | TopicFaultStepSpec
+)
 
 
 @record

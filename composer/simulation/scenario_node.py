@@ -22,6 +22,11 @@ if TYPE_CHECKING:
     from composer.runtime.nodes.live_node import LiveNode
 
 DRIVER: Final = 'scenario'
+_SECTIONS: Final = {
+    'topic': ('publishers', 'subscriptions'),
+    'service': ('services', 'service_clients'),
+    'action': ('actions', 'action_clients'),
+}
 _DEPTH: Final = 1000
 
 
@@ -94,6 +99,8 @@ class ScenarioNode:
 
     def __init__(self, nodes: Mapping[str, LiveNode]) -> None:
         self._nodes = nodes
+        # Of nodes that have ended, by kind and full name.
+        self._types: dict[tuple[str, str], str] = {}
         self._node = nodes[f'/{DRIVER}']
         self._made: dict[tuple[str, str], Any] = {}
         # Others may ask it before anything else has started.
@@ -121,7 +128,7 @@ class ScenarioNode:
         name = _full(topic)
         publisher = self._made.get(('publishers', name))
         if publisher is None:
-            type_name = of_type or self._type_of(name, 'topic', ('subscriptions', 'publishers'))
+            type_name = of_type or self._type_of(name, 'topic')
             publisher = self._make(
                 'publishers', {'type': type_name, 'topic': name, 'qos': self._qos_for(name)}
             )
@@ -138,7 +145,7 @@ class ScenarioNode:
         name = _full(service)
         client = self._made.get(('service_clients', name))
         if client is None:
-            type_name = of_type or self._type_of(name, 'service', ('services', 'service_clients'))
+            type_name = of_type or self._type_of(name, 'service')
             client = self._make('service_clients', {'type': type_name, 'service': name})
         return client.call({} if request is None else request, timeout)
 
@@ -160,14 +167,14 @@ class ScenarioNode:
     def _client_of(self, action: str, of_type: str | None) -> Any:
         client = self._made.get(('action_clients', action))
         if client is None:
-            type_name = of_type or self._type_of(action, 'action', ('actions', 'action_clients'))
+            type_name = of_type or self._type_of(action, 'action')
             client = self._make('action_clients', {'type': type_name, 'action': action})
         return client
 
     def serve(self, service: str, answer: Callable[[Any], Any], of_type: str | None) -> None:
         """Serve a service that the system calls: `answer` returns the payload of the response."""
         name = _full(service)
-        type_name = of_type or self._type_of(name, 'service', ('service_clients',))
+        type_name = of_type or self._type_of(name, 'service')
         data = {'type': type_name, 'service': name, 'group': 'reentrant'}
         self._make('services', data, lambda _node, request: answer(request))
 
@@ -185,7 +192,7 @@ class ScenarioNode:
             return (yield from execute(goal))
 
         name = _full(action)
-        type_name = of_type or self._type_of(name, 'action', ('action_clients',))
+        type_name = of_type or self._type_of(name, 'action')
         server = self._make('actions', {'type': type_name, 'action': name}, behave)
         if not accepts:
             server._accept = _Refusal()  # noqa: SLF001 - as the behaviour `accept` would be
@@ -252,13 +259,11 @@ class ScenarioNode:
         self._node.system.executor.wake()
         return entity
 
-    def _type_of(self, name: str, noun: str, sections: tuple[str, ...]) -> str:
+    def _type_of(self, name: str, noun: str) -> str:
         """Return the type of a topic, service or action of the system, by its full name."""
-        known = {}
+        known = {each: found for (kind, each), found in self._types.items() if kind == noun}
         for node in self._nodes.values():
-            for section in ('publishers', 'subscriptions') if noun == 'topic' else sections:
-                for spec in getattr(node.spec, section).values():
-                    known[_resolve(node, spec, noun)] = spec.type
+            known |= _list_types(node, noun)
         if name in known:
             return str(known[name])
         for each, types in self._graph(noun):
@@ -267,6 +272,13 @@ class ScenarioNode:
             return str(known[name])
         message = f"nobody in the system has a {noun} '{name}'"
         raise SimulationError(message, help=suggest(name, known, 'there are'))
+
+    def note_types(self, full_name: str) -> None:
+        """Know the types of what a node has, also when it has ended."""
+        if (node := self._nodes.get(full_name)) is not None:
+            for noun in _SECTIONS:
+                found = _list_types(node, noun)
+                self._types |= {(noun, name): each for name, each in found.items()}
 
     def _graph(self, noun: str) -> list[tuple[str, list[str]]]:
         ros = self._node.ros
@@ -291,6 +303,14 @@ class ScenarioNode:
 
 def _full(name: str) -> str:
     return expand_name(name, DRIVER, '/')
+
+
+def _list_types(node: LiveNode, noun: str) -> dict[str, str]:
+    return {
+        _resolve(node, spec, noun): str(spec.type)
+        for section in _SECTIONS[noun]
+        for spec in getattr(node.spec, section).values()
+    }
 
 
 def _resolve(node: LiveNode, spec: Any, noun: str) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from contextlib import contextmanager, suppress
+from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakSet
 
@@ -14,12 +16,13 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.publisher import Publisher
 from rclpy.time import Time
 
-from composer.errors import ExitCode
+from composer.errors import ComposerError, ExitCode
 from composer.names import expand_name
 from composer.processes.guardian_client import NoGuardian
 from composer.runtime.logs import system_logger
 from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.system import System
+from composer.simulation.topic_faults import TopicFaults
 from composer.virtual_time.simulated_executor import SimulatedExecutor
 
 if TYPE_CHECKING:
@@ -48,6 +51,9 @@ class SimulatedRun(System):
         observe: Takes what happens.
         on_created: Called when there are all nodes, and none of their behaviours has been called.
         begins_source: Returns whether a source of a node runs as it is.
+
+    Attributes:
+        faults: What happens to messages on their way.
     """
 
     def __init__(
@@ -59,6 +65,8 @@ class SimulatedRun(System):
         begins_source: Callable[[str, str], bool],
     ) -> None:
         self._threads = threads
+        self.faults = TopicFaults(threads)
+        self._ended: dict[str, LiveNode] = {}
         self._on_created = on_created
         super().__init__(reading, NoGuardian(owns_process=False))
         nothing: Any = _Nothing()
@@ -76,14 +84,17 @@ class SimulatedRun(System):
         super()._create_nodes()
         self._on_created()
 
-    def _tap(self, publisher: LocalPublisher) -> Callable[[Any], None]:
+    def _tap(self, publisher: LocalPublisher) -> Callable[[Any], bool]:
         observe: Any = self._handle.observe
         node = publisher.node.get_fully_qualified_name()
         topic, copy = publisher.ros.topic_name, ownership_of(publisher.ros.msg_type).copy
         self._tapped.add(publisher.ros)
 
-        def tap(message: Any) -> None:
+        deliver = partial(publisher.deliver, is_held=False)
+
+        def tap(message: Any) -> bool:
             observe('message', node, topic, copy(message))
+            return self.faults.take(topic, partial(copy, message), deliver)
 
         return tap
 
@@ -95,6 +106,9 @@ class SimulatedRun(System):
         def observed(ros: Publisher, message: Any) -> None:
             if self._threads.mine() is not None and ros not in self._tapped:
                 self._tell_of(ros, message)
+                again, send = partial(deepcopy, message), partial(publish, ros)
+                if self.faults.take(ros.topic_name, again, send):
+                    return
             publish(ros, message)
 
         Publisher.publish = observed
@@ -109,6 +123,38 @@ class SimulatedRun(System):
                 name = ros.topic_name
                 if name not in _UNTOLD:
                     self._handle.tell('message', node.full_name, name, message)
+
+    def end_node(self, full_name: str, *, is_killed: bool) -> None:
+        """End a node.
+
+        Args:
+            is_killed: Whether it ends as with its process: nothing of it is called any more.
+
+        Raises:
+            ComposerError: It does not run.
+        """
+        with self._restarter.lock:
+            node = self._nodes.get(full_name)
+            if node is None:
+                message = f"node '{full_name}' does not run"
+                raise ComposerError(message)
+            if is_killed:
+                self._restarter.drop(full_name)
+            else:
+                self._restarter.remove(full_name)
+            self._ended[full_name] = node
+
+    def begin_node(self, full_name: str) -> None:
+        """Start a node again that has ended.
+
+        Raises:
+            ComposerError: It runs, or it cannot start.
+        """
+        with self._restarter.lock:
+            if full_name not in self._ended:
+                message = f"node '{full_name}' runs"
+                raise ComposerError(message)
+            self._restarter.build(self._ended.pop(full_name))
 
     @property
     def nodes(self) -> Mapping[str, LiveNode]:

@@ -7,10 +7,10 @@ from collections import defaultdict
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from random import Random
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypeAlias
 
 from composer.checks.checker import create_context
-from composer.errors import ComposerError, StartError
+from composer.errors import ComposerError, ExitCode, StartError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import import_declared
 from composer.interfaces.search_paths import extend_variables
@@ -28,8 +28,14 @@ from composer.simulation.project_modules import (
     list_project_modules,
     replaced_objects,
 )
-from composer.simulation.scenario_node import DRIVER, ScenarioNode, SimulatedGoal
+from composer.simulation.scenario_node import (
+    DRIVER,
+    ScenarioNode,
+    SimulatedGoal,
+    SimulationError,
+)
 from composer.simulation.simulated_run import ObservedLog, SimulatedRun, without_processes
+from composer.simulation.topic_faults import TopicFault, TopicFaultKind
 from composer.virtual_time.clocks import to_ns
 from composer.virtual_time.replacements import replaced
 from composer.virtual_time.ros_clocks import simulated_clocks
@@ -40,8 +46,11 @@ if TYPE_CHECKING:
     from types import SimpleNamespace
 
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import WorkerSpec
     from composer.runtime.nodes.system_handle import EventKind
     from composer.virtual_time.unrepeatable import Notice, Watch
+
+NodeAction: TypeAlias = Literal['stop', 'kill', 'start', 'restart']
 
 # pytest shows where a test failed, and nothing of this module.
 __tracebackhide__ = True
@@ -110,6 +119,7 @@ class SimulatedSystem:
         self.replaced: Mapping[str, str] = {}
         self._prepared: list[Callable[[ScenarioNode], None]] = []
         self._messages: defaultdict[str, list[Any]] = defaultdict(list)
+        self._kills: defaultdict[str, int] = defaultdict(int)
 
     def __enter__(self) -> Self:
         """Start it."""
@@ -309,6 +319,69 @@ class SimulatedSystem:
     def _entities(self, node: str, section: str) -> Mapping[str, Any]:
         owner = self._running.nodes.get(node)
         return owner.entities[section] if owner else {}
+
+    def act_on(self, action: NodeAction, name: str) -> None:
+        """Stop, kill, start or restart a node, or all nodes of a worker.
+
+        A killed worker is started again as its `restart` says; a node that was stopped or killed
+        is started again by `start` alone.
+
+        Args:
+            name: That of the node as in the file, its full name, or that of the worker.
+
+        Raises:
+            ComposerError: There is no such node, it has ended or not, or it cannot start.
+        """
+        spec = self.system.spec
+        nodes = spec.nodes_named(name) if spec else []
+        if not nodes or spec is None:
+            message = f"the system has no node and no worker '{name}'"
+            raise SimulationError(message)
+        worker = spec.workers.get(name)
+        with self._threads.entered():
+            for node in nodes:
+                self._change(action, node)
+            if action == 'kill' and worker is not None:
+                self._follow_kill(worker, nodes)
+
+    def _change(self, action: NodeAction, node: str) -> None:
+        run = self._running
+        if action == 'start':
+            run.begin_node(node)
+        elif action != 'restart':
+            self._started_node.note_types(node)
+            run.end_node(node, is_killed=action == 'kill')
+        elif not (outcome := run.restart_node(node)).succeeded:
+            raise SimulationError(outcome.text)
+
+    def _follow_kill(self, worker: WorkerSpec, nodes: list[str]) -> None:
+        """Do what the system does when a worker has ended."""
+        kills = self._kills[worker.name] = self._kills[worker.name] + 1
+        most = worker.most_restarts
+        if worker.restart == 'never' or (most is not None and kills > most):
+            if worker.required:
+                self._running.request_stop(ExitCode.FAILED)
+            return
+
+        def begin_again() -> None:
+            for node in nodes:
+                self._running.begin_node(node)
+
+        self.at(self.now + worker.restart_delay_sec, begin_again)
+
+    def disturb(
+        self, fault: TopicFaultKind, topic: str, seconds: float | None = None, by: float = 0.0
+    ) -> None:
+        """Lose, delay or double what is published on a topic, from now on.
+
+        Args:
+            fault: `drop`, `delay` or `duplicate`.
+            seconds: For how long; `None` for ever.
+            by: How much later messages come that are delayed, in seconds.
+        """
+        end_ns = None if seconds is None else self._threads.now_ns + to_ns(seconds)
+        name = topic if topic.startswith('/') else f'/{topic}'
+        self._running.faults.add(TopicFault(fault, name, end_ns, to_ns(by)))
 
     def call(
         self,

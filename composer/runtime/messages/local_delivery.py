@@ -56,7 +56,8 @@ class LocalPublisher:
         is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
-        tap: Called with each message before it goes anywhere; it must not change or keep it.
+        tap: Called with each message before it goes anywhere; it must not change or keep it. What
+            it returns true for goes nowhere.
         published: How many messages it was given.
     """
 
@@ -65,7 +66,7 @@ class LocalPublisher:
         self.ros = ros
         self.is_local = is_local
         self.reason = ''
-        self.tap: Callable[[Any], None] | None = None
+        self.tap: Callable[[Any], object] | None = None
         self.published = 0
         self._own_reason = why_sent(ros.qos_profile)
         self._always_sends = _always_sends(ros.qos_profile)
@@ -144,8 +145,11 @@ class LocalPublisher:
         """
         self.published += 1
         # A client that leaves takes it away, in another thread.
-        if (tap := self.tap) is not None:
-            tap(message)
+        if (tap := self.tap) is None or not tap(message):
+            self.deliver(message, is_held=is_held)
+
+    def deliver(self, message: Any, *, is_held: bool) -> None:
+        """Hand over or send a message that was published."""
         if self.reason:
             self._send(message)
         elif (
@@ -207,7 +211,7 @@ class LocalPublisher:
             inbox.put(message)
 
 
-FindTap: TypeAlias = 'Callable[[LocalPublisher], Callable[[Any], None] | None]'
+FindTap: TypeAlias = 'Callable[[LocalPublisher], Callable[[Any], object] | None]'
 _Receiver: TypeAlias = 'Inbox | TracedInbox'
 
 
@@ -311,9 +315,9 @@ class LocalTopics:
             name = publisher.node.get_fully_qualified_name()
             taps.append(tracer.create_tap(name, publisher.ros.topic_name))
 
-        def tell_all(message: Any) -> None:
-            for tap in taps:
-                tap(message)
+        def tell_all(message: Any) -> bool:
+            # All are told.
+            return sum(bool(tap(message)) for tap in taps) > 0
 
         publisher.tap = (tell_all if taps[1:] else taps[0]) if taps else None
         publisher.follow_tracer()

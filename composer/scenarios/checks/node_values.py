@@ -13,7 +13,7 @@ from composer.scenarios.parsing.full_names import NameReader
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from composer.diagnostics import Diagnostic
     from composer.language.specs import NodeSpec, ParameterSpec
@@ -28,16 +28,25 @@ def find_node(context: ScenarioContext, name: str) -> NodeSpec | None:
 
 
 def explain_node(
-    context: ScenarioContext, name: str, path: DataPath, *, at_key: bool
+    context: ScenarioContext,
+    name: str,
+    path: DataPath,
+    *,
+    at_key: bool,
+    others: Iterable[str] = (),
 ) -> Diagnostic:
-    """Return the finding for a node that the system does not have."""
+    """Return the finding for a node that the system does not have.
+
+    Args:
+        others: Names of workers, where these may be meant, too.
+    """
     message = f"there is no node '{name}' in this system"
     nodes, listed = context.system.spec.nodes, 'its nodes are'
     if '/' in name:
         full_names = [node.full_name for node in nodes.values()]
         help_text = suggest_full_name(name, full_names, listed)
     else:
-        help_text = suggest(name, nodes, listed)
+        help_text = suggest(name, [*nodes, *others], listed)
     at = context.at_key if at_key else context.at_value
     return at(path, 'unknown-node', message, help=help_text)
 

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from composer.scenarios.checks.channels_of_cases import check_type, explain_unknown, is_known
 from composer.scenarios.checks.message_fields import check_message, part_of
-from composer.scenarios.checks.node_values import check_given_parameters
+from composer.scenarios.checks.node_values import check_given_parameters, explain_node
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
+    NodeStepSpec,
     PublishStepSpec,
     SetParametersStepSpec,
+    TopicFaultStepSpec,
 )
 
 if TYPE_CHECKING:
@@ -113,9 +115,28 @@ def _check_set_parameters(
     yield from check_given_parameters(context, path, may_be_refused=step.refused)
 
 
+def _check_action(
+    context: ScenarioContext, _: CaseSpec, step: NodeStepSpec
+) -> Iterator[Diagnostic]:
+    spec = context.system.spec
+    if not spec.nodes_named(step.name):
+        yield explain_node(
+            context, step.name, (*step.path, step.action), at_key=False, others=spec.workers
+        )
+
+
+def _check_fault(
+    context: ScenarioContext, _: CaseSpec, step: TopicFaultStepSpec
+) -> Iterator[Diagnostic]:
+    if not is_known(context, 'topic', step.topic):
+        yield explain_unknown(context, 'topic', step.topic, (*step.path, step.kind))
+
+
 _CHECKS: dict[type, Callable[[ScenarioContext, CaseSpec, Any], Iterator[Diagnostic]]] = {
     PublishStepSpec: _check_publish,
     CallStepSpec: _check_call,
     GoalStepSpec: _check_goal,
     SetParametersStepSpec: _check_set_parameters,
+    NodeStepSpec: _check_action,
+    TopicFaultStepSpec: _check_fault,
 }

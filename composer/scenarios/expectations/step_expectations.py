@@ -11,8 +11,10 @@ from composer.scenarios.expectations.wording import at_time, count_of
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
+    NodeStepSpec,
     PublishStepSpec,
     SetParametersStepSpec,
+    TopicFaultStepSpec,
 )
 
 if TYPE_CHECKING:
@@ -113,6 +115,11 @@ def _check_parameters(step: SetParametersStepSpec, outcome: Outcome) -> Iterator
         )
 
 
+def _check_done(_step: NodeStepSpec | TopicFaultStepSpec, outcome: Outcome) -> Iterator[Failure]:
+    if outcome.end_ns is None:
+        yield _failure(outcome, 'at', 'the step has not ended', ())
+
+
 def _compare(
     outcome: Outcome, key: str, wanted: Any, found: Any, names: tuple[str, ...]
 ) -> Iterator[Failure]:
@@ -145,4 +152,6 @@ _CHECKS: dict[type, Callable[[Any, Outcome], Iterator[Failure]]] = {
     CallStepSpec: _check_call,
     GoalStepSpec: _check_goal,
     SetParametersStepSpec: _check_parameters,
+    NodeStepSpec: _check_done,
+    TopicFaultStepSpec: _check_done,
 }

@@ -9,8 +9,10 @@ from composer.scenarios.parsing.full_names import absolute
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
+    NodeStepSpec,
     PublishStepSpec,
     SetParametersStepSpec,
+    TopicFaultStepSpec,
 )
 from composer.scenarios.times import to_nanoseconds
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
     from composer.scenarios.parsing.full_names import NameReader
     from composer.scenarios.specs import StepSpec
+    from composer.simulation.simulated_system import NodeAction
+    from composer.simulation.topic_faults import TopicFaultKind
     from composer.yaml_text.positions import DataPath
 
 DEFAULT_TIMEOUT_SEC = 5.0
@@ -34,7 +38,18 @@ def parse_step(data: Mapping[str, Any], path: DataPath, names: NameReader) -> St
             refused=data.get('refused', False),
             path=path,
         )
-    verb = next(verb for verb in _VERBS if verb in data)
+    verb = next(verb for verb in (*_VERBS, *_ACTIONS, *_FAULTS) if verb in data)
+    if verb in _ACTIONS:
+        return NodeStepSpec(parse_schedule(data), verb, data[verb], path)
+    if verb in _FAULTS:
+        return TopicFaultStepSpec(
+            schedule=parse_schedule(data),
+            kind=verb,
+            topic=absolute(data[verb]),
+            seconds=data.get('for'),
+            delay_sec=float(data.get('by', 0)),
+            path=path,
+        )
     return _VERBS[verb](data, path)
 
 
@@ -79,6 +94,8 @@ def _parse_goal(data: Mapping[str, Any], path: DataPath) -> GoalStepSpec:
     )
 
 
+_ACTIONS: tuple[NodeAction, ...] = ('stop', 'kill', 'start', 'restart')
+_FAULTS: tuple[TopicFaultKind, ...] = ('drop', 'delay', 'duplicate')
 _VERBS: dict[str, Callable[[Mapping[str, Any], DataPath], StepSpec]] = {
     'publish': _parse_publish,
     'call': _parse_call,

@@ -19,8 +19,10 @@ from composer.scenarios.running.failure_reports import locate
 from composer.scenarios.specs import (
     CallStepSpec,
     GoalStepSpec,
+    NodeStepSpec,
     PublishStepSpec,
     SetParametersStepSpec,
+    TopicFaultStepSpec,
 )
 from composer.scenarios.times import NANOSECONDS
 
@@ -91,6 +93,11 @@ class CaseSteps:
                 return self._send_goal(step, time_ns)
             case SetParametersStepSpec():
                 return self._set_parameters(step, time_ns)
+            case NodeStepSpec():
+                self._simulated.act_on(step.action, step.name)
+            case TopicFaultStepSpec():
+                self._simulated.disturb(step.kind, step.topic, step.seconds, step.delay_sec)
+        return Outcome(step, time_ns, self._now_ns())
 
     def _publish(self, step: PublishStepSpec, time_ns: int) -> Outcome:
         self._simulated.publish(step.topic, step.message, step.type)
