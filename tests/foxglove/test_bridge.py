@@ -138,7 +138,9 @@ class Foxglove:
 @contextmanager
 def connected(port, **options):
     url, protocols = f'ws://127.0.0.1:{port}', ['foxglove.sdk.v1']
-    with connect(url, subprotocols=protocols, max_size=None, **options) as socket:
+    # Who leaves waits for no answer behind all that is still sent.
+    more = {'max_size': None, 'close_timeout': 0.1, **options}
+    with connect(url, subprotocols=protocols, **more) as socket:
         yield Foxglove(socket)
 
 

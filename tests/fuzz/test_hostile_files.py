@@ -50,8 +50,10 @@ def _run_in_child(folder, output, words, more):
 
 # What is followed for as long as the limits allow.
 SLOW = (
-    *('chain_of_attributes', 'chain_of_elif', 'classes', 'functions_that_call_each_other'),
-    *('many_modules', 'thousands_of_unknown_publishers'),
+    *('assignments_in_reverse', 'chain_of_attributes', 'chain_of_elif', 'classes'),
+    *('different_expressions', 'equal_functions', 'functions_that_call_each_other'),
+    *('long_comprehension', 'many_large_modules', 'many_modules', 'packages_of_interfaces'),
+    *('processes_that_wait', 'thousands_of_unknown_publishers'),
 )
 
 

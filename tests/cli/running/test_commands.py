@@ -142,7 +142,7 @@ def test_what_cannot_be_asked_is_told(composer, domain_id, name):
 
 def test_external_processes_are_listed_and_restarted(compose, composer, wait_for):
     """One that has failed for good is no healthy system, until it is restarted."""
-    busy = 'trap exit INT TERM; while :; do :; done & wait'
+    busy = 'trap exit INT TERM; while :; do n=0; while [ $n -lt 9999 ]; do n=$((n+1)); done; sleep 0.1; done & wait'
     failing = 'while [ ! -e mended ]; do exit 3; done; sleep 3600'
     text = SYSTEM + (
         'processes:\n'

@@ -125,7 +125,7 @@ def test_a_parameter_that_is_set_governs_the_next_call(run):
 def test_what_is_wrong_is_told_with_a_way_out(run, words, code, told):
     words = words.split()
     # What is not there is not waited for; what is there may be found late.
-    limit = ['--timeout', '4' if 'no ' in told[0] and '/' in told[0] else '40']
+    limit = ['--timeout', '4' if told[-1].startswith("did you mean '/") else '40']
     found, _, err = run(*words[:1], *limit, *words[1:])
     assert (found, 'Traceback' in err) == (code, False)
     for each in told:

@@ -130,6 +130,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folders
 
 
+@pytest.mark.long
 def test_every_kind_of_field_comes_back_from_the_middleware(
     run_python: RunPython,
     parts: tuple[Path, Path],
