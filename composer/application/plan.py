@@ -102,9 +102,27 @@ def plan(
     running = running or _ask_running(old.spec, host)
     if isinstance(running, ComposerError):
         raise running
+    return _compare_running(running, old), findings
+
+
+def plan_from(
+    running: str, paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
+) -> tuple[Plan | None, Sequence[Diagnostic], CheckContext | None]:
+    """Return what its files would make of a running system, what is wrong, and what was read.
+
+    Args:
+        running: What the system answers about itself; see `plan` for the others.
+    """
+    context, findings = _read(paths, words, set_values, None, '', checks=True)
+    if context is None or has_errors(findings):
+        return None, findings, context
+    return _compare_running(running, context), findings, context
+
+
+def _compare_running(running: str, context: CheckContext) -> Plan:
     prefixes = decode_snapshot(read_answer(running)).prefixes
-    new = take_snapshot(old, [Path(each) for each in prefixes])
-    return compare(*conceal_both(running, new)), findings
+    new = take_snapshot(context, [Path(each) for each in prefixes])
+    return compare(*conceal_both(running, new))
 
 
 def _ask_running(spec: SystemSpec, host: str) -> str | ComposerError:

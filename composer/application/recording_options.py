@@ -1,7 +1,9 @@
-"""What `composer up` is to record, and to show Foxglove."""
+"""What `composer up` is to record, and to show Foxglove or on a page."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from composer.runtime.local_part import SystemRecorder
     from composer.runtime.messages.local_delivery import LocalTopics
 
+_PAGE_SEC = 5.0
+
 
 @record
 class RecordingOptions:
@@ -28,7 +32,9 @@ class RecordingOptions:
     Attributes:
         target: What is to be written; `None` if nothing is recorded.
         topics: Patterns of the topics that are wanted; all if there are none.
-        bridge: How it is shown; `None` if it is not.
+        bridge: How it is shown to Foxglove; `None` if it is not.
+        page_port: Where its page is served, 0 for any port; `None` for no page.
+        allows_changes: Whether the page may change it.
 
     Raises:
         UsageError: Topics are named, and no file.
@@ -37,6 +43,8 @@ class RecordingOptions:
     target: Path | None = None
     topics: Sequence[str] = ()
     bridge: BridgeOptions | None = None
+    page_port: int | None = None
+    allows_changes: bool = False
 
     def __post_init__(self) -> None:
         """Check that they fit together."""
@@ -56,6 +64,7 @@ class RecordingOptions:
             ComposerError: The file cannot be written, or the port cannot be served.
         """
         recorders = Recorders()
+        page = self._start_page(name)
         try:
             if self.target is not None:
                 recorders.append(_create_recorder(self.target, self.topics))
@@ -64,6 +73,29 @@ class RecordingOptions:
             yield recorders
         finally:
             recorders.stop()
+            if page is not None:
+                end_by_input(page)
+
+    def _start_page(self, name: str) -> subprocess.Popen[bytes] | None:
+        if self.page_port is None:
+            return None
+        options = ['--no-browser', '--ends-with-input', f'--port={self.page_port}']
+        options += ['--allow-changes'] * self.allows_changes
+        # It ends with this process, whatever happens to that; signals of a terminal are not its.
+        return subprocess.Popen(  # noqa: S603 - Composer itself
+            [sys.executable, '-m', 'composer', 'page', *options, '--', name],
+            stdin=subprocess.PIPE,
+            start_new_session=True,
+        )
+
+
+def end_by_input(page: subprocess.Popen[bytes]) -> None:
+    """End a process that ends with its input."""
+    try:
+        page.communicate(timeout=_PAGE_SEC)
+    except subprocess.TimeoutExpired:
+        page.kill()
+        page.wait()
 
 
 class Recorders(list['SystemRecorder']):

@@ -4,30 +4,67 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.checks.placement.crossings import describe_place
+from composer.diagnostics import relative_path
 from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
 from composer.drawing.qos_labels import describe_policies
 from composer.drawing.shapes import tokens_of
 from composer.entity_kinds import CHANNEL_KINDS
+from composer.language.bindings import node_bindings
 from composer.names import join_names
+from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from composer.checks.context import CheckContext
     from composer.drawing.excerpts import Excerpt
     from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
+    from composer.language.specs import BehaviourSpec
 
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
 # Of a topic with many ends, the lines of the first ones.
 _MOST_ENDS = 6
+_MOST_CODE_LINES = 15
 
 
-def describe_drawing(picture: Picture) -> dict[str, Any]:
+def list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
+    """Return the behaviours of each node with the lines of their functions, by its full name."""
+    return {
+        node.full_name: [
+            {'what': binding.owner, **place}
+            for binding in node_bindings(node)
+            if (place := _find_code(context, binding.behaviour))
+        ]
+        for node in context.spec.nodes.values()
+    }
+
+
+def _find_code(context: CheckContext, behaviour: BehaviourSpec) -> dict[str, Any] | None:
+    module = context.modules.find(behaviour.module) if behaviour.module else None
+    if not isinstance(module, ModuleSource) or module.path is None:
+        return None
+    function = module.functions.get(behaviour.function)
+    found = (function.definition or function.class_definition) if function else None
+    if found is None or not context.modules.is_of_project(behaviour.module):
+        return None
+    last = min(found.end_lineno or found.lineno, found.lineno + _MOST_CODE_LINES - 1)
+    lines = module.lines[found.lineno - 1 : last]
+    return {'file': relative_path(str(module.path)), 'first': found.lineno, 'lines': lines}
+
+
+def describe_drawing(
+    picture: Picture, code: dict[str, list[dict[str, Any]]] | None = None
+) -> dict[str, Any]:
     """Return a picture as the page takes it: its SVG, and its parts by their tokens.
+
+    Args:
+        code: See `list_code`.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
@@ -36,6 +73,8 @@ def describe_drawing(picture: Picture) -> dict[str, Any]:
         'name': picture.name,
         'description': picture.description,
         'svg': _inlined(svg.render_picture(picture)),
+        'code': code or {},
+        'folder': str(Path.cwd()),
         **_describe(picture),
     }
 

@@ -1,4 +1,4 @@
-"""What the page asks the graph for when somebody looks: parameters of a node, a message."""
+"""What the page asks the graph for when somebody looks or acts: parameters, messages, calls."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
 from composer.interfaces.plain_messages import plain_message
+from composer.runtime.control import protocol
+from composer.runtime.messages.payload_texts import read_parameter, read_payload
 
 if TYPE_CHECKING:
-    from composer.application.running_systems.client import Client
+    from composer.application.running_systems.client import Client, RunningSystem
 
 _ANSWER_SEC = 3.0
+_RELOAD_SEC = 60.0
 _MOST = 500
 _LONGEST_TEXT = 100_000
 
@@ -53,14 +56,11 @@ def look_at_message(client: Client, topic: str) -> dict[str, Any]:
     from composer.recordings.graph_recorder import match_offers, read_offer
     from composer.yaml_text.writer import render_yaml
 
-    types = dict(client.node.get_topic_names_and_types()).get(topic, [])
-    if len(types) != 1:
-        message = f"the graph has no topic '{topic}'" if not types else 'it has several types'
-        raise ComposerError(message)
+    type_name = _find_type(client, 'topic', topic)
     found: list[Any] = []
     ends = client.node.get_publishers_info_by_topic(topic)
     profile = match_offers(read_offer(each.qos_profile) for each in ends)
-    message_class = import_message(types[0])
+    message_class = import_message(type_name)
     ros = client.node.create_subscription(message_class, topic, found.append, profile)
     try:
         deadline = monotonic() + _ANSWER_SEC
@@ -71,7 +71,111 @@ def look_at_message(client: Client, topic: str) -> dict[str, Any]:
     if not found:
         message = f'no message came within {_ANSWER_SEC:g} s'
         raise ComposerError(message)
-    return {'text': render_yaml(plain_message(found[0]))[:_LONGEST_TEXT], 'type': types[0]}
+    return {'text': render_yaml(plain_message(found[0]))[:_LONGEST_TEXT], 'type': type_name}
+
+
+def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
+    """Return the fields of a message or a request, with their defaults, as `text` in YAML.
+
+    Args:
+        kind: `topic` or `service`.
+
+    Raises:
+        ComposerError: There is no such topic or service, or its type is not installed.
+    """
+    from composer.interfaces.classes import import_interface
+    from composer.yaml_text.writer import render_yaml
+
+    type_name = _find_type(client, kind, name)
+    found: Any = import_interface(type_name)
+    message = found.Request() if kind == 'service' else found()
+    data = plain_message(message)
+    return {'text': render_yaml(data) if data else '', 'type': type_name}
+
+
+def act(client: Client, system: RunningSystem, wish: dict[str, str]) -> dict[str, Any]:
+    """Do what somebody wants, and return what came of it, as `text`.
+
+    Args:
+        wish: `action`: `reload`, `restart`, `set`, `call` or `publish`; `name`: of a node, a
+            service or a topic; `parameter`; `text`: a value or a payload, in YAML.
+
+    Raises:
+        ComposerError: It cannot be done, or what is wanted does not fit.
+    """
+    action, name, text = (wish.get(key, '') for key in ('action', 'name', 'text'))
+    if action in ('reload', 'restart'):
+        outcome = (
+            client.ask(system, protocol.RELOAD, _RELOAD_SEC)
+            if action == 'reload'
+            else client.restart(system, name, _RELOAD_SEC)
+        )
+        if not outcome.succeeded:
+            raise ComposerError(outcome.text)
+        return {'text': outcome.text or 'nothing has changed'}
+    done = {'set': _set, 'call': _call_service, 'publish': _publish}.get(action)
+    if done is None:
+        message = f"there is no action '{action}'"
+        raise ComposerError(message)
+    return {'text': done(client, name, text, wish.get('parameter', ''))}
+
+
+def _set(client: Client, node: str, text: str, parameter: str) -> str:
+    from rcl_interfaces.srv import GetParameterTypes, SetParameters
+
+    asked = GetParameterTypes.Request(names=[parameter])
+    types = _call(client, GetParameterTypes, f'{node}/get_parameter_types', asked).types
+    request = SetParameters.Request(parameters=[read_parameter(parameter, text, types[0])])
+    (result,) = _call(client, SetParameters, f'{node}/set_parameters', request).results
+    if not result.successful:
+        message = f'{node} refuses {parameter} = {text}: {result.reason or "without a reason"}'
+        raise ComposerError(message)
+    return f'{parameter} = {text}'
+
+
+def _call_service(client: Client, service: str, text: str, _: str) -> str:
+    from composer.interfaces.classes import import_interface
+    from composer.yaml_text.writer import render_yaml
+
+    service_class: Any = import_interface(_find_type(client, 'service', service))
+    answer = _call(client, service_class, service, read_payload(text, service_class.Request))
+    return render_yaml(plain_message(answer))[:_LONGEST_TEXT]
+
+
+def _publish(client: Client, topic: str, text: str, _: str) -> str:
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+
+    from composer.recordings.definitions import import_message
+
+    message_class = import_message(_find_type(client, 'topic', topic))
+    message = read_payload(text, message_class)
+    ends = client.node.get_subscriptions_info_by_topic(topic)
+    kept, profile = DurabilityPolicy.TRANSIENT_LOCAL, QoSProfile(depth=1)
+    if any(each.qos_profile.durability == kept for each in ends):
+        profile.durability = kept
+    ros = client.node.create_publisher(message_class, topic, profile)
+    try:
+        deadline = monotonic() + _ANSWER_SEC
+        while ros.get_subscription_count() < len(ends) and monotonic() < deadline:
+            client.executor.spin_once(timeout_sec=0.05)
+        ros.publish(message)
+        # Else it would be gone before all have it.
+        ros.wait_for_all_acked()
+    finally:
+        client.node.destroy_publisher(ros)
+    return f'published, to {len(ends)} subscriptions'
+
+
+def _find_type(client: Client, kind: str, name: str) -> str:
+    node = client.node
+    listed = (
+        node.get_service_names_and_types if kind == 'service' else node.get_topic_names_and_types
+    )
+    types = dict(listed()).get(name, [])
+    if len(types) != 1:
+        message = f"'{name}' has several types" if types else f"the graph has no {kind} '{name}'"
+        raise ComposerError(message)
+    return str(types[0])
 
 
 def _range(descriptor: Any) -> list[float] | None:

@@ -11,6 +11,8 @@ const byId = (id) => document.getElementById(id);
 let svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
 let parts = new Map();
 let findings = [];
+let code = {};
+let folder = '';
 let state = {};
 let heard = 0;
 let drawn = 0;
@@ -95,9 +97,21 @@ function makeLink(token, text) {
   return item;
 }
 
+// A place in a file; it opens the editor, where there is one.
+function makePlace(file, line) {
+  const text = line ? `${file}:${line}` : file;
+  if (!state.editor || !file || file.startsWith('--')) return document.createTextNode(text);
+  const path = file.startsWith('/') ? file : `${folder}/${file}`;
+  const link = make('a', text);
+  link.href = state.editor.replace('{file}', encodeURI(path)).replace('{line}', line ?? 1);
+  return link;
+}
+
 function makeExcerpt(excerpt) {
   const block = document.createDocumentFragment();
-  block.append(make('p', `${excerpt.file}:${excerpt.first}`, 'place'));
+  const place = make('p', excerpt.what ? `${excerpt.what}: ` : '', 'place');
+  place.append(makePlace(excerpt.file, excerpt.first));
+  block.append(place);
   const text = make('pre');
   const width = String(excerpt.first + excerpt.lines.length - 1).length;
   excerpt.lines.forEach((line, index) => {
@@ -126,6 +140,9 @@ function describe(token) {
   for (const fact of part.facts) details.append(make('p', fact));
   for (const index of part.findings) details.append(makeFinding(findings[index]));
   for (const excerpt of part.excerpts) details.append(makeExcerpt(excerpt));
+  for (const excerpt of code[part.id.slice(5)] ?? []) {
+    if (part.kind === 'node') details.append(makeExcerpt(excerpt));
+  }
   if (part.near.length) {
     const list = make('ul');
     for (const near of part.near) {
@@ -152,6 +169,7 @@ function choose(token, mustBeSeen) {
   showLive();
   askParameters();
   offerMessage();
+  offerActs();
   showLog();
   if (chosen === null) return;
   shapeOf(token).classList.add('chosen', 'near');
@@ -274,6 +292,8 @@ async function draw() {
   const before = chosen === null ? decodeURIComponent(location.hash.slice(1)) : parts.get(chosen).id;
   parts = new Map(Object.entries(drawing.parts ?? {}));
   findings = drawing.findings ?? [];
+  code = drawing.code ?? {};
+  folder = drawing.folder ?? '';
   tokens.clear();
   for (const [token, part] of parts) tokens.set(part.id, token);
   if (drawing.svg) {
@@ -467,10 +487,94 @@ async function askParameters() {
   for (const each of found) {
     const about = [each.range ? `${each.range[0]} to ${each.range[1]}` : '',
       each.read_only ? 'read-only' : '', each.description].filter(Boolean).join(', ');
-    list.append(make('dt', each.name), make('dd', `${JSON.stringify(each.value)}  ${about}`));
+    const value = make('dd');
+    const text = JSON.stringify(each.value);
+    if (state.allows_changes && !each.read_only) {
+      const wish = () => ({action: 'set', name: part.id.slice(5), parameter: each.name});
+      value.append(makeForm(`Set ${each.name}`, text, wish, 'Set'), ` ${about}`);
+    } else value.append(`${text}  ${about}`);
+    list.append(make('dt', each.name), value);
   }
   section.append(make('h2', 'Parameters'), list);
 }
+
+// What changes the system, where the page may.
+async function act(wish, told) {
+  told.textContent = '…';
+  const answer = await fetch('api/act', {
+    method: 'POST', headers: {'content-type': 'application/json'}, body: JSON.stringify(wish),
+  });
+  const found = await answer.json().catch(() => ({problem: `refused (${answer.status})`}));
+  told.textContent = found.problem ?? found.text;
+  told.className = found.problem ? 'error' : '';
+}
+
+function makeButton(text, wish, told) {
+  const button = make('button', text);
+  button.type = 'button';
+  button.addEventListener('click', () => act(wish, told));
+  return button;
+}
+
+// A field for a value or a payload, with what came of it below.
+function makeForm(label, text, wish, verb) {
+  const form = make('form');
+  const field = make(text.includes('\n') ? 'textarea' : 'input');
+  const told = make('pre');
+  told.setAttribute('role', 'status');
+  field.value = text;
+  field.setAttribute('aria-label', label);
+  if (field.tagName === 'TEXTAREA') field.rows = Math.min(12, text.split('\n').length);
+  const button = make('button', verb);
+  form.append(field, button, told);
+  form.addEventListener('submit', (event) => {
+    event.preventDefault();
+    act({...wish(), text: field.value}, told);
+  });
+  return form;
+}
+
+async function offerActs() {
+  const section = byId('acts');
+  section.replaceChildren();
+  const part = parts.get(chosen);
+  if (!state.allows_changes || !state.runs || !part) return;
+  if (part.kind === 'node') {
+    const told = make('p');
+    told.setAttribute('role', 'status');
+    const wish = {action: 'restart', name: part.id.slice(5)};
+    section.append(makeButton('Restart the node', wish, told), told);
+  } else if (part.kind === 'topic' || part.kind === 'service') {
+    const [verb, action] = part.kind === 'topic' ? ['Publish once', 'publish'] : ['Call', 'call'];
+    const asked = chosen;
+    const found = await get(`api/template?kind=${part.kind}&name=${encodeURIComponent(part.name)}`);
+    if (chosen !== asked || found.problem) return;
+    const wish = () => ({action, name: part.name});
+    section.append(make('h2', verb), make('p', found.type, 'kind'),
+      makeForm(`Fields of ${found.type}`, `${found.text}\n`, wish, verb));
+  }
+}
+
+// What a reload would do to what runs, before it is done; and what the last one did.
+function showPlans() {
+  const next = state.next;
+  const last = state.status?.last_reload;
+  byId('next').hidden = !next;
+  const shown = JSON.stringify([next, last, state.allows_changes]);
+  if (byId('changes').dataset.shown === shown) return;
+  byId('changes').dataset.shown = shown;
+  byId('plan').textContent = (next?.lines ?? []).join('\n');
+  byId('plan').hidden = !next?.lines.length;
+  byId('refused').replaceChildren(...(next?.findings ?? []).map((finding) => {
+    const text = makeFinding(finding);
+    text.append(' ', makePlace(finding.file, finding.line));
+    return text;
+  }));
+  byId('reload').hidden = !(state.allows_changes && next && !next.findings.length);
+  byId('last').textContent = last
+    ? `Last reload, ${new Date(last.time * 1000).toTimeString().slice(0, 8)}: ${last.message || (last.succeeded ? 'done' : 'failed')}` : '';
+}
+byId('reload').addEventListener('click', () => act({action: 'reload'}, byId('told')));
 
 // A message of the chosen topic, when somebody asks for one.
 function offerMessage() {
@@ -542,6 +646,7 @@ function take(next) {
   mark();
   showSummary();
   showProblems();
+  showPlans();
   showTree();
   showLive();
   if (state.runs) fetchLog();

@@ -1,4 +1,4 @@
-"""The HTTP server of the page: loopback only, with a secret, and read-only."""
+"""The HTTP server of the page: loopback only, with a secret, and read-only by default."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
-from composer.page.looks import list_parameters, look_at_message
+from composer.page.looks import act, list_parameters, look_at_message, show_template
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, MutableMapping
@@ -49,6 +49,8 @@ _KEEP_ALIVE_SEC = 15.0
 # States come no faster than they can be looked at.
 _SHORTEST_PAUSE_SEC = 0.25
 _ANSWER_SEC = 12.0
+_ACT_SEC = 70.0
+_LONGEST_WISH = 100_000
 _ASSETS = {'page.css': 'text/css', 'page.js': 'text/javascript'}
 
 
@@ -58,6 +60,8 @@ class PageServer:
     Args:
         source: Where the page is from.
         port: 0 for any that is free.
+        editor: The address of a line in an editor, with `{file}` and `{line}`; empty for none.
+        allows_changes: Whether the page may change the system.
 
     Raises:
         ComposerError: The port is taken, or the extra `page` is missing.
@@ -66,7 +70,14 @@ class PageServer:
         address: With the secret, which is good for one browser after the other.
     """
 
-    def __init__(self, source: DrawnFiles | WatchedSystem, port: int) -> None:
+    def __init__(
+        self,
+        source: DrawnFiles | WatchedSystem,
+        port: int,
+        editor: str = '',
+        *,
+        allows_changes: bool = False,
+    ) -> None:
         try:
             import starlette  # noqa: F401 - asked for at once
             import uvicorn
@@ -76,6 +87,8 @@ class PageServer:
         self._uvicorn = uvicorn
         self._source = source
         self._secret = secrets.token_urlsafe(32)
+        self._allows_changes = allows_changes
+        self._settings = {'allows_changes': allows_changes, 'editor': editor}
         self._streams = 0
         self._wakers: set[asyncio.Event] = set()
         self._socket = socket.socket()
@@ -138,6 +151,8 @@ class PageServer:
                 Route('/api/log', self._log),
                 Route('/api/parameters', self._parameters),
                 Route('/api/message', self._message),
+                Route('/api/template', self._template),
+                Route('/api/act', self._act, methods=['POST']),
                 Route('/{name}', self._asset),
             ]
         )
@@ -177,7 +192,11 @@ class PageServer:
         if origin and origin.removeprefix('http://') not in self._hosts:
             return 'another page may not read this one'
         if request.method != 'GET':
-            return 'this page only shows'
+            # Browsers name the origin of each request that may change something.
+            if request.method != 'POST' or not (self._allows_changes and origin):
+                return "this page only shows: 'composer page --allow-changes' lets it change"
+            if request.headers.get('content-type') != 'application/json':
+                return 'a wish is JSON'
         if self._brings_secret(request) or self._is_secret(request.cookies.get(self._cookie, '')):
             return ''
         return "open the address that 'composer page' prints"
@@ -206,7 +225,10 @@ class PageServer:
         return Response(_read_asset(name), media_type=_ASSETS[name])
 
     async def _state(self, _request: Request) -> Response:
-        return _json(self._source.state)
+        return _json(self._shown())
+
+    def _shown(self) -> dict[str, Any]:
+        return {**self._source.state, **self._settings}
 
     async def _drawing(self, _request: Request) -> Response:
         return _json(self._source.drawing)
@@ -227,14 +249,39 @@ class PageServer:
         topic = request.query_params.get('topic', '')
         return await self._ask(lambda client: look_at_message(client, topic))
 
-    async def _ask(self, question: Callable[[Client], Any]) -> Response:
+    async def _template(self, request: Request) -> Response:
+        kind, name = (request.query_params.get(each, '') for each in ('kind', 'name'))
+        return await self._ask(lambda client: show_template(client, kind, name))
+
+    async def _act(self, request: Request) -> Response:
+        body = b''
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > _LONGEST_WISH:
+                return _json({'problem': 'that is too long'}, 413)
+        try:
+            wish = json.loads(body)
+        except ValueError:
+            wish = None
+        if not isinstance(wish, dict) or not all(isinstance(each, str) for each in wish.values()):
+            return _json({'problem': 'a wish is a mapping of texts'}, 400)
+        system = self._source.system
+        if system is None:
+            return _json({'problem': 'the system does not run'}, 504)
+        return await self._ask(lambda client: act(client, system, wish), _ACT_SEC)
+
+    async def _ask(
+        self, question: Callable[[Client], Any], timeout_sec: float = _ANSWER_SEC
+    ) -> Response:
         """Return what the graph answers to a question."""
         future: Future[Any] = Future()
         self._source.ask(question, future)
         try:
-            return _json(await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_SEC))
+            return _json(await asyncio.wait_for(asyncio.wrap_future(future), timeout_sec))
         except (ComposerError, TimeoutError) as error:
-            return _json({'problem': str(error) or 'no answer'}, 504)
+            more = getattr(error, 'help', None)
+            text = str(error) or 'no answer'
+            return _json({'problem': f'{text} ({more})' if more else text}, 504)
 
     async def _stream(self, receive: Receive, send: Send) -> None:
         """Send the newest state after each change, until the browser leaves or does not read."""
@@ -253,7 +300,7 @@ class PageServer:
             await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
             while not left.done():
                 waker.clear()
-                text = f'data: {_dump(self._source.state)}\n\n'
+                text = f'data: {_dump(self._shown())}\n\n'
                 body = {'type': 'http.response.body', 'body': text.encode(), 'more_body': True}
                 await asyncio.wait_for(send(body), _SEND_SEC)
                 await asyncio.wait([left], timeout=_SHORTEST_PAUSE_SEC)

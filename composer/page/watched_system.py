@@ -20,8 +20,9 @@ from composer.drawing.graphviz import DrawingError
 from composer.drawing.picture import build_picture
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.page.drawn_parts import describe_drawing
+from composer.page.drawn_parts import describe_drawing, list_code
 from composer.page.problems import list_problems
+from composer.page.saved_files import SavedFiles
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def draw_files(
     if context is None:
         texts = [f'{each.span or each.file}: {each.message}' for each in findings]
         raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
-    return describe_drawing(build_picture(context, findings))
+    return describe_drawing(build_picture(context, findings), list_code(context))
 
 
 class DrawnFiles:
@@ -69,6 +70,7 @@ class DrawnFiles:
         self.drawing: dict[str, Any] = draw_files(paths, words, set_values)
         self.state: dict[str, Any] = {'name': self.drawing['name'], 'runs': False, 'drawing': 1}
         self.log: deque[dict[str, Any]] = deque()
+        self.system = None
         self.changed: Callable[[], object] = lambda: None
 
     def start(self) -> None:
@@ -94,6 +96,8 @@ class WatchedSystem:
         self.drawing: dict[str, Any] = {}
         self.state: dict[str, Any] = {'name': name or '', 'runs': False}
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
+        self.system: RunningSystem | None = None
+        self._saved = SavedFiles()
         self.changed: Callable[[], object] = lambda: None
         self._lines = 0
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
@@ -125,7 +129,7 @@ class WatchedSystem:
     def _watch(self, client: Client) -> None:
         """Ask the system until it ends."""
         try:
-            system = Discovery(client).find(self._name)
+            system = self.system = Discovery(client).find(self._name)
             with (
                 client.asking(system, protocol.STATUS) as ask_status,
                 client.asking(system, protocol.TOP) as ask_health,
@@ -133,6 +137,7 @@ class WatchedSystem:
                 self._draw(client, system)
                 self._follow(client, system, ask_status, ask_health)
         except ComposerError as error:
+            self.system = None
             self._tell({'runs': False, 'problem': str(error)})
             self._spin(client, monotonic() + 1.0)
 
@@ -146,6 +151,7 @@ class WatchedSystem:
                 said = answer_forms.read_answer(status(STATUS_SEC).text, answer_forms.STATUS)
                 if before and before['last_reload'] != said['last_reload']:
                     self._draw(client, system)
+                self._saved.look()
             try:
                 found = read_health(health(STATUS_SEC))
             except ComposerError as error:
@@ -161,6 +167,8 @@ class WatchedSystem:
                     'health': found,
                     'problems': list_problems(said, found),
                     'drawing': self.state.get('drawing', 0),
+                    'drawing_problem': self.state.get('drawing_problem', ''),
+                    'next': self._saved.next_plan,
                 }
             )
             self._spin(client, monotonic() + max(_POLL_SEC, found['period_sec'] / 2))
@@ -171,8 +179,9 @@ class WatchedSystem:
             text = client.ask(system, protocol.SNAPSHOT, _SNAPSHOT_SEC).text
             given = answer_forms.read_answer(text, answer_forms.SNAPSHOT)['given']
             file = Path((system.status or {}).get('file', ''))
-            layers = [Path(each) for each in given['layers']]
-            self.drawing = draw_files([file, *layers], given['words'], given['set_values'])
+            paths = [file, *(Path(each) for each in given['layers'])]
+            self._saved.follow(text, paths, given['words'], given['set_values'])
+            self.drawing = draw_files(paths, given['words'], given['set_values'])
         except (ComposerError, DrawingError) as error:
             # The page is for the same computer as the files, and shows the rest without.
             self.drawing, problem = {}, str(error)

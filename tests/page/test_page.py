@@ -31,12 +31,16 @@ nodes:
     parameters: {{gain: {{default: 1.5, maximum: 5.0, description: "{EVIL}"}}}}
     publishers: {{words: std_msgs/msg/String}}
     timers: {{say: {{rate: 10, behaviour: 'parts:say', publish: words}}}}
+    services: {{switch: {{type: std_srvs/srv/SetBool, behaviour: 'parts:switch'}}}}
   ear:
     subscriptions: {{words: {{topic: /left/words, type: std_msgs/msg/String, behaviour: 'parts:hear'}}}}
 """
 CODE = f"""
 def say(node):
     return '{EVIL}' + '.' * round(node.parameters.gain)
+
+def switch(node, request):
+    return {{'success': request.data, 'message': '{EVIL}'}}
 
 def hear(node, message):
     node.state.count = node.state.count + 1 if hasattr(node.state, 'count') else 1
@@ -72,6 +76,20 @@ class Page:
     def json(self, path):
         return json.loads(self.get(path, cookie=self.cookie)[2])
 
+    def act(self, body, **headers):
+        """Return the status and the answer to a wish."""
+        given = {
+            'cookie': self.cookie,
+            'origin': f'http://127.0.0.1:{self.port}',
+            'content-type': 'application/json',
+        }
+        text = body if isinstance(body, str) else json.dumps(body)
+        with closing(http.client.HTTPConnection('127.0.0.1', self.port, timeout=20)) as connection:
+            connection.request('POST', '/api/act', text, given | headers)
+            answer = connection.getresponse()
+            found = answer.read().decode()
+            return answer.status, found if answer.status == 403 else json.loads(found)
+
     @contextmanager
     def stream(self):
         """Yield the states that are sent from now on."""
@@ -96,6 +114,100 @@ def page(shared_compose):
     yield page
     assert page.end() == 130
     assert child.stop() == 0
+
+
+@pytest.fixture(scope='module')
+def acting(page, shared_compose):
+    acting = Page(shared_compose.domain_id, 'system', '--allow-changes')
+    wait_for(lambda: acting.json('/api/state').get('health'), 'the system to answer')
+    yield acting
+    assert acting.end() == 130
+
+
+@pytest.mark.parametrize(
+    ('wish', 'told'),
+    [
+        ({'action': 'set', 'name': '/left/talker', 'parameter': 'gain', 'text': '2'}, 'gain = 2'),
+        ({'action': 'call', 'name': '/left/switch', 'text': '{data: true}'}, 'success: true'),
+        ({'action': 'publish', 'name': '/left/words', 'text': 'hello'}, 'to 1 subscription'),
+        ({'action': 'restart', 'name': '/left/talker'}, "node '/left/talker' was restarted"),
+    ],
+)
+def test_it_changes_what_it_may(acting, wish, told):
+    status, found = acting.act(wish)
+    assert (status, told in found['text']) == (200, True), found
+
+
+@pytest.mark.parametrize(
+    ('wish', 'status', 'told'),
+    [
+        (
+            {'action': 'set', 'name': '/left/talker', 'parameter': 'gain', 'text': '9'},
+            504,
+            'gain = 9',
+        ),
+        ({'action': 'set', 'name': '/nobody', 'parameter': 'a', 'text': '9'}, 504, 'not answer'),
+        ({'action': 'call', 'name': '/left/switch', 'text': '{dta: true}'}, 504, "'dta'"),
+        ({'action': 'call', 'name': '/left/switch', 'text': '{data: '}, 504, 'is no YAML'),
+        ({'action': 'publish', 'name': '/nothing', 'text': ''}, 504, "no topic '/nothing'"),
+        ({'action': 'leave'}, 504, "no action 'leave'"),
+        ({'action': 3}, 400, 'mapping of texts'),
+        ('[', 400, 'mapping of texts'),
+        ('"' + 'x' * 200_000 + '"', 413, 'too long'),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_changed_is_told(acting, wish, status, told):
+    found = acting.act(wish)
+    assert (found[0], told in found[1]['problem']) == (status, True), found
+
+
+@pytest.mark.parametrize(
+    'headers',
+    [
+        {'origin': 'http://robot.example'},
+        {'origin': 'null'},
+        {'content-type': 'text/plain'},
+        {'cookie': ''},
+        {'host': 'robot.example'},
+    ],
+    ids=str,
+)
+def test_others_change_nothing(acting, page, headers):
+    wish = {'action': 'restart', 'name': '/left/talker'}
+    assert acting.act(wish, **headers)[0] == 403
+    assert page.act(wish)[0] == 403
+
+
+def test_what_a_saved_edit_would_do_is_shown_before_it_is_done(acting, shared_compose):
+    def next_plan():
+        return acting.json('/api/state').get('next')
+
+    path = shared_compose.folder / 'system.yaml'
+    text = path.read_text()
+    path.write_text(text.replace('rate: 10', 'rate: 20'))
+    plan = wait_for(next_plan, 'the plan')
+    assert plan['lines'][0].startswith("~ timer 'say' of '/left/talker': period")
+    path.write_text(text.replace('publish: words', 'publish: wrds'))
+    (finding, *_) = wait_for(lambda: (next_plan() or plan)['findings'], 'the finding')
+    assert (finding['rule'], finding['line']) == ('unknown-publisher', 9)
+    path.write_text(text)
+    wait_for(lambda: not next_plan(), 'no plan')
+    path.write_text(text.replace('rate: 10', 'rate: 5'))
+    wait_for(next_plan, 'the plan')
+    assert '~1 timer' in acting.act({'action': 'reload'})[1]['text']
+    wait_for(lambda: not next_plan(), 'no plan')
+    assert '~1 timer' in acting.json('/api/state')['status']['last_reload']['message']
+
+
+def test_a_page_beside_a_system_ends_with_it(compose):
+    child = compose(SYSTEM, CODE, '--page')
+    child.wait_until_ready()
+    port = int(re.search(r':(\d+)/\?token', child.wait_for_line('token='))[1])
+    socket.create_connection(('127.0.0.1', port)).close()
+    assert child.stop() == 0
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(('127.0.0.1', port))
 
 
 def test_the_state_says_what_is_wrong_and_where(page):
@@ -178,9 +290,11 @@ def test_another_address_is_refused_with_the_way_round(shared_compose):
 
 def test_a_file_is_shown_that_does_not_run(page, shared_compose):
     still = Page(shared_compose.domain_id, str(shared_compose.folder / 'system.yaml'))
-    assert still.json('/api/state') == {'name': 'system', 'runs': False, 'drawing': 1}
-    assert 'node:/ear' in {each['id'] for each in still.json('/api/drawing')['parts'].values()}
+    state, drawing = still.json('/api/state'), still.json('/api/drawing')
     assert still.end() == 130
+    assert (state['name'], state['runs'], state['drawing']) == ('system', False, 1)
+    assert 'node:/ear' in {each['id'] for each in drawing['parts'].values()}
+    assert drawing['code']['/ear'][0]['lines'][0] == 'def hear(node, message):'
 
 
 @pytest.fixture
@@ -198,7 +312,7 @@ def browser():
     browser.quit()
 
 
-def test_a_browser_shows_it(page, browser):
+def test_a_browser_shows_it(page, acting, shared_compose, browser):
     def find(selector):
         return browser.find_elements('css selector', selector)
 
@@ -224,5 +338,23 @@ def test_a_browser_shows_it(page, browser):
     wait_for(lambda: find('#message button'), 'the topic')
     find('#message button')[0].click()
     wait_for(lambda: EVIL in text_of('#message pre'), 'a message')
+    # Where it may, it changes values, and does what a saved edit would.
+    browser.get(acting.address)
+    wait_for(lambda: find('#tree button'), 'the nodes')
+    browser.get(f'http://127.0.0.1:{acting.port}/#node%3A%2Fleft%2Ftalker')
+    field = wait_for(lambda: find('#parameters input'), 'a parameter')[0]
+    field.clear()
+    field.send_keys('3.5\n')
+    wait_for(lambda: text_of('#parameters form pre') == 'gain = 3.5', 'the answer')
+    assert 'def say(node)' in text_of('#details')
+    assert find('#details a')[0].get_attribute('href').startswith('vscode://file/')
+    browser.get(f'http://127.0.0.1:{acting.port}/#service%3A%2Fleft%2Fswitch')
+    wait_for(lambda: find('#acts form button'), 'the service')[0].click()
+    wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
+    text = (shared_compose.folder / 'system.yaml').read_text()
+    (shared_compose.folder / 'system.yaml').write_text(text.replace('rate: 5', 'rate: 8'))
+    wait_for(lambda: 'period' in text_of('#plan'), 'the plan')
+    find('#reload')[0].click()
+    wait_for(lambda: '~1 timer' in text_of('#last'), 'the reload')
     assert not find('img')
     assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []

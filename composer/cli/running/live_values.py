@@ -7,7 +7,6 @@ import re
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from textwrap import indent
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,9 @@ from composer.application.running_systems.client import Client
 from composer.errors import ComposerError, ExitCode, UsageError
 from composer.interfaces.plain_messages import plain_message
 from composer.names import count_of
+from composer.runtime.messages.payload_texts import read_parameter, read_payload
 from composer.signals import asked_to_stop
 from composer.spelling import suggest
-from composer.yaml_text.reader import parse_document
 from composer.yaml_text.writer import COMPOSER, render_scalar, render_yaml
 
 if TYPE_CHECKING:
@@ -38,8 +37,6 @@ _FIELD = re.compile(r'(\w+|\[\d+\])(\.\w+|\[\d+\])*')
 _STEP = re.compile(r'\w+')
 _SUCCEEDED = 4
 _STATUSES = {5: 'canceled', 6: 'aborted'}
-# Of rcl_interfaces/msg/ParameterType: these take whole numbers, too.
-_DOUBLE, _DOUBLES = 3, 8
 
 
 class _Graph:
@@ -210,7 +207,7 @@ def call(service: str, payload: str, timeout_sec: float) -> int:
         graph = _Graph(client, is_asked, timeout_sec)
         name, type_name = graph.find('service', service)
         service_class: Any = import_interface(type_name)
-        request = _read(payload, service_class.Request)
+        request = read_payload(payload, service_class.Request)
         _show(_call(graph, name, service_class, request))
     return ExitCode.DONE
 
@@ -239,7 +236,7 @@ def send_goal(action: str, payload: str, timeout_sec: float) -> int:
         graph = _Graph(client, is_asked, timeout_sec)
         name, type_name = graph.find('action', action)
         action_class: Any = import_interface(type_name)
-        goal = _read(payload, action_class.Goal)
+        goal = read_payload(payload, action_class.Goal)
         ros = ActionClient(graph.node, action_class, name)
         try:
             silent = f"the action '{name}' did not answer within {timeout_sec:g} s"
@@ -277,10 +274,8 @@ def set_parameter(node: str, name: str, text: str, timeout_sec: float) -> int:
     Raises:
         ComposerError: There is no such node or parameter, or the node refuses the value.
     """
-    value = _parse(text)
     with asked_to_stop() as is_asked, Client() as client:
         from rcl_interfaces.srv import GetParameterTypes, ListParameters, SetParameters
-        from rclpy.parameter import Parameter
 
         graph = _Graph(client, is_asked, timeout_sec)
         full_name = _find_node(graph, node)
@@ -291,11 +286,7 @@ def set_parameter(node: str, name: str, text: str, timeout_sec: float) -> int:
             names = _call(graph, f'{full_name}/list_parameters', ListParameters, listed)
             message = f"'{full_name}' has no parameter '{name}'"
             raise ComposerError(message, help=suggest(name, names.result.names, 'it has'))
-        try:
-            parameter = Parameter(name, value=_fit(value, types[0])).to_parameter_msg()
-        except (TypeError, ValueError, AssertionError):
-            message = f'{text} is no value of a parameter'
-            raise ComposerError(message) from None
+        parameter = read_parameter(name, text, types[0])
         request = SetParameters.Request(parameters=[parameter])
         [result] = _call(graph, f'{full_name}/set_parameters', SetParameters, request).results
         if not result.successful:
@@ -318,33 +309,6 @@ def _find_node(graph: _Graph, node: str) -> str:
         raise ComposerError(message, help='write the full name of one')
     kind = 'node'
     raise graph.missing(kind, node)
-
-
-def _fit(value: Any, parameter_type: int) -> Any:
-    if parameter_type == _DOUBLE and type(value) is int:
-        return float(value)
-    if parameter_type == _DOUBLES and isinstance(value, list):
-        return [float(each) if type(each) is int else each for each in value]
-    return value
-
-
-def _read(text: str, message_class: type) -> Any:
-    """Return the message of a payload, checked as one in a file."""
-    from composer.runtime.messages.payloads import converter_for
-
-    return converter_for(message_class).convert(_parse(text))
-
-
-def _parse(text: str) -> Any:
-    if not text.strip():
-        return {}
-    block = f'value: {text}\n' if '\n' not in text else f'value:\n{indent(text, "  ")}\n'
-    document = parse_document(block.encode(), 'the payload')
-    if document.data is None or document.diagnostics:
-        finding = document.diagnostics[0]
-        message = f"'{text}' is no YAML: {finding.message}"
-        raise UsageError(message, help=finding.help)
-    return document.data['value']
 
 
 def _pick(message: Any, field: str, *, is_checked: bool = False) -> Any:

@@ -76,21 +76,49 @@ def show_command(
     '--listen', default='127.0.0.1', metavar='ADDRESS', help='Only this computer may be.'
 )
 @click.option('--no-browser', 'opens', flag_value=False, default=True, help='Only print it.')
-def page_command(
-    words: tuple[str, ...], set_values: tuple[str, ...], *, port: int, listen: str, opens: bool
+@click.option(
+    '--allow-changes',
+    'allows_changes',
+    is_flag=True,
+    help='Let the page set parameters, reload, restart nodes, call services and publish.',
+)
+@click.option(
+    '--editor',
+    default='vscode://file{file}:{line}',
+    show_default=True,
+    metavar='ADDRESS',
+    help="What a place in a file links to; '' for no links.",
+)
+@click.option('--ends-with-input', is_flag=True, hidden=True)
+def page_command(  # noqa: PLR0913 - one for each option
+    words: tuple[str, ...],
+    set_values: tuple[str, ...],
+    *,
+    port: int,
+    listen: str,
+    opens: bool,
+    allows_changes: bool,
+    editor: str,
+    ends_with_input: bool,
 ) -> int:
     """Serve a page of the running SYSTEM, or of a FILE.
 
     The page shows what is wrong, the graph, the nodes with their figures, parameters and log, and
-    the text of the file. If only one system runs, it need not be named. The page only shows, and
-    only this computer can open it, by the address that is printed.
+    the text of the files. If only one system runs, it need not be named. Only this computer can
+    open it, by the address that is printed.
     """
-    from composer.page.serve import serve
+    from composer.page.serve import PageOptions, serve
 
     is_name = len(words) == 1 and not set_values and not words[0].endswith(('.yaml', '.yml'))
     paths, arguments = ([], []) if is_name or not words else split_words(words)
     name = words[0] if is_name else None
-    return serve(name, paths, arguments, set_values, port=port, listen=listen, opens=opens)
+    return serve(
+        name,
+        paths,
+        arguments,
+        set_values,
+        PageOptions(port, listen, opens, allows_changes, editor, ends_with_input),
+    )
 
 
 @click.command('graph', context_settings=NUMBERS_ARE_VALUES)

@@ -24,14 +24,17 @@ from composer.cli.common.argument_types import (
 from composer.errors import ExitCode
 from composer.terminal import escape
 
+# By default.
+_PORTS = {'--foxglove': FOXGLOVE_PORT, '--page': 0}
+
 
 class _Up(click.Command):
-    """Takes `--foxglove` before a file, too: its port may be left out."""
+    """Takes `--foxglove` and `--page` before a file, too: their port may be left out."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         for i, (word, following) in enumerate(pairwise(args)):
-            if word == '--foxglove' and not following.isdecimal():
-                args[i] = f'{word}={FOXGLOVE_PORT}'
+            if word in _PORTS and not following.isdecimal():
+                args[i] = f'{word}={_PORTS[word]}'
         return super().parse_args(ctx, args)
 
 
@@ -89,6 +92,15 @@ class _Up(click.Command):
 )
 @takes_bridge
 @click.option(
+    '--page',
+    'page_port',
+    type=click.IntRange(0, LAST_PORT),
+    is_flag=False,
+    flag_value=0,
+    metavar='[PORT]',
+    help="Serve its page beside it, as 'composer page' does; any free port by default.",
+)
+@click.option(
     '--hold',
     type=click.Path(path_type=Path, dir_okay=False),
     metavar='FILE',
@@ -114,6 +126,7 @@ def up_command(  # noqa: PLR0913 - one for each option
     trace: IO[str] | None,
     port: int | None,
     address: str | None,
+    page_port: int | None,
     hold: Path | None,
     wants_help: bool,
 ) -> int:
@@ -145,9 +158,11 @@ def up_command(  # noqa: PLR0913 - one for each option
         options += [] if port is None else [f'--foxglove={port}']
         options += [] if address is None else [f'--listen={address}']
         options += ['--allow-changes'] * allows_changes
+        options += [] if page_port is None else [f'--page={page_port}']
         options += [f'--hold={hold}'] * (hold is not None)
         given = [*options, *words, '--ros-args', *context.obj, '--']
         return start_detached(paths[0], given, host)
+    for_page_alone = page_port is not None and port is None
     return up(
         paths,
         arguments,
@@ -158,7 +173,11 @@ def up_command(  # noqa: PLR0913 - one for each option
         watches=watches,
         is_asked=is_asked,
         recording=RecordingOptions(
-            record, topics, bridge_options(port, address, allows_changes=allows_changes)
+            record,
+            topics,
+            bridge_options(port, address, allows_changes=allows_changes and not for_page_alone),
+            page_port,
+            allows_changes,
         ),
         hold=hold,
         trace=trace,

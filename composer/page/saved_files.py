@@ -1,0 +1,96 @@
+"""What a running system would become: its files as they are saved, and not yet applied."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from composer.application.plan import plan_from
+from composer.application.system_reader import list_files
+from composer.drawing.json_document import describe_finding
+from composer.errors import ComposerError
+from composer.planning.text import render_plan
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+_MOST_LINES = 200
+
+
+class SavedFiles:
+    """Compares the files of a system with what runs, whenever one of them is saved.
+
+    Attributes:
+        next_plan: `lines`, as `composer plan` prints them, and `findings`; `None` if a reload
+            would change nothing.
+    """
+
+    def __init__(self) -> None:
+        self.next_plan: dict[str, Any] | None = None
+        self._given: tuple[str, Sequence[Path], Sequence[str], Sequence[str]] | None = None
+        self._files: list[Path] = []
+        self._times: list[int] = []
+        self._thread: threading.Thread | None = None
+
+    def follow(
+        self,
+        running: str,
+        paths: Sequence[Path],
+        words: Sequence[str],
+        set_values: Sequence[str],
+    ) -> None:
+        """Compare with this from now on.
+
+        Args:
+            running: What the system answers about itself.
+            paths: Its file and layers.
+            words: Its arguments.
+            set_values: Values that were set.
+        """
+        self._given = running, paths, words, set_values
+        self.next_plan, self._times = None, []
+        self._files = list(paths)
+
+    def look(self) -> None:
+        """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
+        if self._given is None or (self._thread and self._thread.is_alive()):
+            return
+        times = [_time_of(each) for each in self._files]
+        if times != self._times:
+            self._times = times
+            name = 'composer-next-plan'
+            self._thread = threading.Thread(
+                target=self._plan, args=self._given, name=name, daemon=True
+            )
+            self._thread.start()
+
+    def _plan(
+        self,
+        running: str,
+        paths: Sequence[Path],
+        words: Sequence[str],
+        set_values: Sequence[str],
+    ) -> None:
+        lines: list[str] = []
+        findings: list[Any] = []
+        try:
+            plan, found, context = plan_from(running, paths, words, set_values)
+            if context is not None:
+                self._files = sorted(list_files(context))
+                self._times = [_time_of(each) for each in self._files]
+            if plan is None:
+                findings = [describe_finding(each) for each in found]
+            elif plan.operations:
+                lines = render_plan(plan).splitlines()[:_MOST_LINES]
+        except ComposerError as error:
+            lines = [str(error)]
+        if self._given and self._given[0] == running:
+            self.next_plan = {'lines': lines, 'findings': findings} if lines or findings else None
+
+
+def _time_of(path: Path) -> int:
+    with suppress(OSError):
+        return path.stat().st_mtime_ns
+    return 0

@@ -1,0 +1,62 @@
+"""Payloads as people write them, in YAML → messages and parameters."""
+
+from __future__ import annotations
+
+from textwrap import indent
+from typing import TYPE_CHECKING, Any
+
+from composer.errors import ComposerError, UsageError
+from composer.yaml_text.reader import parse_document
+
+if TYPE_CHECKING:
+    from rcl_interfaces.msg import Parameter
+
+# Of rcl_interfaces/msg/ParameterType: these take whole numbers, too.
+_DOUBLE, _DOUBLES = 3, 8
+
+
+def read_payload(text: str, message_class: type) -> Any:
+    """Return the message of a payload, checked as one in a file.
+
+    Raises:
+        UsageError: It is no YAML.
+        PayloadError: It does not fit.
+    """
+    from composer.runtime.messages.payloads import converter_for
+
+    return converter_for(message_class).convert(_parse(text))
+
+
+def read_parameter(name: str, text: str, parameter_type: int) -> Parameter:
+    """Return a parameter with the value that a text has.
+
+    Args:
+        parameter_type: Its type, as in `rcl_interfaces/msg/ParameterType`.
+
+    Raises:
+        ComposerError: It is no value of a parameter.
+    """
+    from rclpy.parameter import Parameter
+
+    value = _parse(text)
+    if parameter_type == _DOUBLE and type(value) is int:
+        value = float(value)
+    elif parameter_type == _DOUBLES and isinstance(value, list):
+        value = [float(each) if type(each) is int else each for each in value]
+    try:
+        return Parameter(name, value=value).to_parameter_msg()
+    except (TypeError, ValueError, AssertionError):
+        message = f'{text} is no value of a parameter'
+        raise ComposerError(message) from None
+
+
+def _parse(text: str) -> Any:
+    if not text.strip():
+        return {}
+    block = f'value: {text}\n' if '\n' not in text else f'value:\n{indent(text, "  ")}\n'
+    document = parse_document(block.encode(), 'the payload')
+    if document.data is None or document.diagnostics:
+        finding = document.diagnostics[0]
+        message = f"'{text}' is no YAML: {finding.message}"
+        raise UsageError(message, help=finding.help)
+    return document.data['value']
