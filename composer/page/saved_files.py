@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from contextlib import suppress
+from time import time_ns
 from typing import TYPE_CHECKING, Any
 
 from composer.application.plan import plan_from
@@ -31,7 +32,7 @@ class SavedFiles:
         self.next_plan: dict[str, Any] | None = None
         self._given: tuple[str, Sequence[Path], Sequence[str], Sequence[str]] | None = None
         self._files: list[Path] = []
-        self._times: list[int] = []
+        self._times: dict[Path, int] = {}
         self._thread: threading.Thread | None = None
 
     def follow(
@@ -50,14 +51,14 @@ class SavedFiles:
             set_values: Values that were set.
         """
         self._given = running, paths, words, set_values
-        self.next_plan, self._times = None, []
+        self.next_plan, self._times = None, {}
         self._files = list(paths)
 
     def look(self) -> None:
         """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
         if self._given is None or (self._thread and self._thread.is_alive()):
             return
-        times = [_time_of(each) for each in self._files]
+        times = {each: _time_of(each) for each in self._files}
         if times != self._times:
             self._times = times
             name = 'composer-next-plan'
@@ -75,11 +76,11 @@ class SavedFiles:
     ) -> None:
         lines: list[str] = []
         findings: list[Any] = []
+        files, begun_ns = list(paths), time_ns()
         try:
             plan, found, context = plan_from(running, paths, words, set_values)
             if context is not None:
-                self._files = sorted(list_files(context))
-                self._times = [_time_of(each) for each in self._files]
+                files = sorted(list_files(context))
             if plan is None:
                 findings = [describe_finding(each) for each in found]
             elif plan.operations:
@@ -87,6 +88,10 @@ class SavedFiles:
         except ComposerError as error:
             lines = [str(error)]
         if self._given and self._given[0] == running:
+            # One that was saved meanwhile is looked at again.
+            more = {each: _time_of(each) for each in files if each not in self._times}
+            self._times |= {each: found for each, found in more.items() if found < begun_ns}
+            self._files = files
             self.next_plan = {'lines': lines, 'findings': findings} if lines or findings else None
 
 

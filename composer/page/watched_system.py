@@ -151,7 +151,7 @@ class WatchedSystem:
                 said = answer_forms.read_answer(status(STATUS_SEC).text, answer_forms.STATUS)
                 if before and before['last_reload'] != said['last_reload']:
                     self._draw(client, system)
-                self._saved.look()
+            self._saved.look()
             try:
                 found = read_health(health(STATUS_SEC))
             except ComposerError as error:

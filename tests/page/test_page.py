@@ -352,7 +352,7 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     wait_for(lambda: find('#acts form button'), 'the service')[0].click()
     wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
     text = (shared_compose.folder / 'system.yaml').read_text()
-    (shared_compose.folder / 'system.yaml').write_text(text.replace('rate: 5', 'rate: 8'))
+    (shared_compose.folder / 'system.yaml').write_text(re.sub(r'rate: \d+', 'rate: 8', text))
     wait_for(lambda: 'period' in text_of('#plan'), 'the plan')
     find('#reload')[0].click()
     wait_for(lambda: '~1 timer' in text_of('#last'), 'the reload')
