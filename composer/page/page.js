@@ -84,6 +84,8 @@ function make(tag, text = '', className = '') {
   const element = document.createElement(tag);
   element.textContent = text;
   if (className) element.className = className;
+  // What scrolls is scrolled with the keyboard, too.
+  if (tag === 'pre') element.tabIndex = 0;
   return element;
 }
 

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 from contextlib import closing, contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +22,7 @@ from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
 
+AXE = Path(pytest.importorskip('axe_core_python').__file__).parent / 'axe.min.js'
 EVIL = '<img src=x onerror=alert(1)>'
 SYSTEM = f"""
 version: 1
@@ -312,7 +314,22 @@ def browser():
     browser.quit()
 
 
+def find_violations(browser, rest):
+    """Return what people with some disability cannot use, but for the `rest` of the page."""
+    browser.execute_script(AXE.read_text())
+    found = browser.execute_async_script(
+        'axe.run({exclude: arguments[0]}).then(arguments[1])', rest
+    )
+    return [
+        (each['id'], node['html'], node['any'][:1] and node['any'][0]['message'])
+        for each in found['violations']
+        for node in each['nodes']
+    ]
+
+
 def test_a_browser_shows_it(page, acting, shared_compose, browser):
+    from selenium.webdriver import Keys
+
     def find(selector):
         return browser.find_elements('css selector', selector)
 
@@ -356,5 +373,12 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     wait_for(lambda: 'period' in text_of('#plan'), 'the plan')
     find('#reload')[0].click()
     wait_for(lambda: '~1 timer' in text_of('#last'), 'the reload')
+    # All can use it, in light and dark; what is not chosen is dim in the drawing.
+    for rest in ([['main svg']], []):
+        for scheme in ('light', 'dark'):
+            media = {'features': [{'name': 'prefers-color-scheme', 'value': scheme}]}
+            browser.execute_cdp_cmd('Emulation.setEmulatedMedia', media)
+            assert find_violations(browser, rest) == []
+        browser.find_element('css selector', 'body').send_keys(Keys.ESCAPE)
     assert not find('img')
     assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
