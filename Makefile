@@ -4,7 +4,7 @@
 CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
 # Most tests wait, for processes and discovery: two cores serve more processes of tests than two.
-WORKERS ?= 4
+WORKERS ?= 6
 VENV := .venv
 ifdef ROS_DISTRO
 EXTRAS := record,types,foxglove,graph,page,hosts,dev
