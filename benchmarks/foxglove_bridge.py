@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from benchmarks.programs import READY, composed
+from benchmarks.programs import READY, Program, composed
 from benchmarks.systems import render_system
 
 if TYPE_CHECKING:
@@ -30,18 +30,8 @@ def measure(side: str, size: int, seconds: float) -> dict[str, float]:
         side: `subscribed` by one client to everything, `idle` without a client, or `alone` without
             the bridge.
     """
-    end = {'topic': 'words', 'type': 'std_msgs/msg/String'}
-    timer = {'rate': 100, 'behaviour': f'{__name__}:talk', 'publish': 'out'}
-    nodes = {
-        f'node_{number}': {
-            'parameter_services': False,
-            'publishers': {'out': {**end, 'topic': f'words_{number}'}},
-            'timers': {'talk': timer},
-        }
-        for number in range(size)
-    }
     options = [] if side == 'alone' else ['--foxglove', '0']
-    with composed(render_system(nodes), *options) as program:
+    with composed(render_system(talking_nodes(size)), *options) as program:
         program.wait_for_line(READY)
         context: Any = nullcontext()
         if side == 'subscribed':
@@ -51,11 +41,29 @@ def measure(side: str, size: int, seconds: float) -> dict[str, float]:
         with context as socket:
             if socket is not None:
                 threading.Thread(target=_read, args=(socket,), daemon=True).start()
-            time.sleep(_SETTLE_SEC)
-            begun, before = time.monotonic(), program.cpu_sec()
-            time.sleep(seconds)
-            used = program.cpu_sec() - before
-            return {'percent': 100 * used / (time.monotonic() - begun)}
+            return measure_percent(program, seconds)
+
+
+def measure_percent(program: Program, seconds: float) -> dict[str, float]:
+    """Return the `percent` of one core that a program uses, once it has settled."""
+    time.sleep(_SETTLE_SEC)
+    begun, before = time.monotonic(), program.cpu_sec()
+    time.sleep(seconds)
+    return {'percent': 100 * (program.cpu_sec() - before) / (time.monotonic() - begun)}
+
+
+def talking_nodes(count: int) -> dict[str, Any]:
+    """Return nodes that publish at 100 Hz, each on a topic of its own."""
+    end = {'topic': 'words', 'type': 'std_msgs/msg/String'}
+    timer = {'rate': 100, 'behaviour': f'{__name__}:talk', 'publish': 'out'}
+    return {
+        f'node_{number}': {
+            'parameter_services': False,
+            'publishers': {'out': {**end, 'topic': f'words_{number}'}},
+            'timers': {'talk': timer},
+        }
+        for number in range(count)
+    }
 
 
 def _read(socket: ClientConnection) -> None:

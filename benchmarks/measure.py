@@ -33,6 +33,7 @@ SUBJECTS = {
     'nobody': Subject('benchmarks.nobody', 1.0),
     'recording': Subject('benchmarks.recording', 4.0),
     'foxglove_bridge': Subject('benchmarks.foxglove_bridge', 6.0),
+    'page': Subject('benchmarks.page', 6.0),
     'simulated': Subject('benchmarks.simulated', 5.0),
     'overhead': Subject('benchmarks.message_overhead'),
     'forty': Subject('benchmarks.forty'),

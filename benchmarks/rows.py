@@ -171,6 +171,19 @@ def _foxglove() -> list[Row]:
     return [row('without a client', 'idle', 1), row('one subscribes to all', 'subscribed', 15)]
 
 
+def _page() -> list[Row]:
+    def row(what: str, target: float) -> Row:
+        ours, other = (_side('page', name, 50, 'percent') for name in (what, 'alone'))
+        title = f'50 nodes at 100 Hz, % of a core for a page that is {what}'
+        return Row(title, ours, other, more, '<=', target)
+
+    def picture(size: int, target: float) -> Row:
+        ours = _side('page', 'picture', size, 'seconds')
+        return Row(f'page of {size} nodes, s until it is drawn', ours, None, alone, '<=', target)
+
+    return [row('open', 3), row('closed', 0.5), picture(50, 1), picture(1000, 3)]
+
+
 def _simulated() -> list[Row]:
     def row(size: int, target: float) -> Row:
         ours, other = (_side('simulated', side, size, 'speed') for side in ('virtual', 'real'))
@@ -367,6 +380,7 @@ ROWS: list[Row] = [
     *_overhead(),
     *_recording(),
     *_foxglove(),
+    *_page(),
     *_simulated(),
     *_forty(),
     *_further_node(),

@@ -24,6 +24,7 @@ TINY = {
     'idle_cpu': 2,
     'large_messages': 1,
     'overhead': 1,
+    'page': 2,
     'reloads': 5,
     'round_trips': 1,
     'save_to_callback': 3,
