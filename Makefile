@@ -28,7 +28,7 @@ PIP_FLAGS := --upgrade --upgrade-strategy eager
 endif
 BIN := $(VENV)/bin
 
-.PHONY: up test test-all check format docs bench lock clean newest
+.PHONY: up test test-all check format docs screenshots bench lock clean newest
 
 up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
@@ -51,6 +51,10 @@ format: $(VENV)/ready
 
 docs: $(VENV)/ready
 	$(BIN)/python docs/generate.py
+
+# The pictures of the page, by Chromium and its driver.
+screenshots: $(VENV)/ready
+	$(BIN)/python docs/screenshots.py
 
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks.run --json build/bench.json $(ARGS)

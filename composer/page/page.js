@@ -312,7 +312,8 @@ async function draw() {
   for (const [token, part] of parts) makeSelectable(token, part);
   find();
   showTree();
-  choose(tokens.get(before), false);
+  // Until there is a drawing, the address keeps what is wanted.
+  if (parts.size) choose(tokens.get(before), false);
   mark();
 }
 
@@ -624,13 +625,14 @@ function showSummary() {
   const period = state.health?.period_sec ?? 1;
   const age = (Date.now() - heard) / 1000;
   const isOld = state.runs && age > 2 * period + 1;
-  document.body.classList.toggle('old', isOld || !state.runs);
+  // A file that does not run is as new as it gets.
+  document.body.classList.toggle('old', isOld || (!state.runs && state.problem !== undefined));
   const status = state.status;
   const cpu = (state.health?.processes ?? []).reduce((sum, each) => sum + (each.cpu ?? 0), 0);
   byId('summary').textContent = status
     ? `${isOld ? `last heard ${age.toFixed(0)} s ago` : state.runs ? status.state : 'gone'}, `
       + `${status.nodes.length} nodes, ${(100 * cpu).toFixed(0)} % of a core, ${status.host}, `
-      + `process ${status.pid}, ${status.file}`
+      + `process ${status.pid}, ${status.file.slice(status.file.lastIndexOf('/') + 1)}`
     : state.problem || 'a file: nothing runs';
 }
 
@@ -655,7 +657,7 @@ function take(next) {
 }
 
 window.addEventListener('resize', () => show(shaped(view)));
-window.addEventListener('hashchange', () => choose(tokens.get(decodeURIComponent(location.hash.slice(1))), true));
+window.addEventListener('hashchange', () => parts.size && choose(tokens.get(decodeURIComponent(location.hash.slice(1))), true));
 setInterval(showSummary, 1000);
 const events = new EventSource('api/events');
 events.addEventListener('message', (event) => take(JSON.parse(event.data)));
