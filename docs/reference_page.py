@@ -22,6 +22,7 @@ _TITLES = {
         for kind in (*ENTITY_KINDS[1:], ENTITY_KINDS[0])
     },
     'hook': 'A behaviour',
+    'interface_package': 'An interface package',
     'argument': 'An argument',
     'include': 'An include',
     'combination': 'A combination to check',

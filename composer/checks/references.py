@@ -174,9 +174,11 @@ def describe_missing_type(context: CheckContext, full_name: str) -> tuple[str, s
         otherwise = ", or name the folder of its definitions under 'interfaces:'"
         help_text = explain_missing_package(package, packages, otherwise)
         return f"no interface package '{package}' is installed", package, help_text
+    noun = _KIND_NOUNS[kind]
+    if advice := context.interfaces.explain_left_out(full_name):
+        return f"'only:' of the package '{package}' leaves out its {noun} '{name}'", name, advice
     known = context.catalogue.names(cast('InterfaceKind', kind), package)
     names = [full.rpartition('/')[2] for full in known]
-    noun = _KIND_NOUNS[kind]
     advice = suggest(name, names, f'its {noun}s are')
     return f"the package '{package}' has no {noun} '{name}'", name, advice
 

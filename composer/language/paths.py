@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from composer.ament import explain_missing_package, find_share, find_source, list_packages
@@ -11,6 +12,7 @@ from composer.input_limits import explain_missing
 from composer.language.values.start_values import replace_start_values
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from composer.diagnostics import Span
@@ -71,8 +73,9 @@ def resolve_paths(system: LoadedSystem) -> None:
     resolved = dict(data)
     if 'interfaces' in data:
         resolved['interfaces'] = {
-            package: _resolved(folder, ('interfaces', package), positions)
-            for package, folder in data['interfaces'].items()
+            package: with_folder(entry, partial(_resolved, path=path, positions=positions))
+            for package, entry in data['interfaces'].items()
+            for path in [path_of_folder(package, positions)]
         }
     for section in ('nodes', 'processes', 'hosts'):
         if section in data:
@@ -83,6 +86,17 @@ def resolve_paths(system: LoadedSystem) -> None:
     system.data = replace_start_values(
         resolved, lambda path, value: _with_file(value, path, positions)
     )
+
+
+def path_of_folder(package: str, positions: SourceMap) -> DataPath:
+    """Return where a file names the folder of an interface package."""
+    path = ('interfaces', package)
+    return (*path, 'folder') if (*path, 'folder') in positions.values else path
+
+
+def with_folder(entry: str | dict[str, Any], change: Callable[[str], str]) -> str | dict[str, Any]:
+    """Return an entry of `interfaces:` with its folder changed."""
+    return change(entry) if isinstance(entry, str) else entry | {'folder': change(entry['folder'])}
 
 
 def _with_file(value: dict[str, Any], path: DataPath, positions: SourceMap) -> dict[str, Any]:

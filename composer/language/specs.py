@@ -792,6 +792,8 @@ class SystemSpec:
     Attributes:
         name: The file's name without its ending.
         interfaces: The folders of interface packages to build if they are not installed.
+        listed_interfaces: What alone is built of a package, as in `msg/Name`, with the messages
+            that it uses; packages that are not here are built whole.
         qos: The named profiles of the file.
         threads: How many callbacks may run at the same time; `None` for as many as block.
         shutdown_timeout_sec: What running callbacks get to end when the system stops.
@@ -806,6 +808,7 @@ class SystemSpec:
     name: str
     description: str
     interfaces: Mapping[str, str]
+    listed_interfaces: Mapping[str, tuple[str, ...]]
     qos: Mapping[str, QosSpec]
     threads: int | None
     shutdown_timeout_sec: float

@@ -126,6 +126,9 @@ class Library:
             # The parts of services and actions are called `SetBool_Request` and the like.
             if name.partition('_')[0] in known:
                 return None
+            whole = f'{package}/{kind}/{name.partition("_")[0]}'
+            if advice := self.context.interfaces.explain_left_out(whole):
+                return f"'only:' of the package '{package}' leaves out '{name}'", advice
             found = [each for each in (*full, *elsewhere) if catalogue.has(each)]
         else:
             return None

@@ -20,6 +20,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.arguments import describe_arguments
 from composer.language.parameter_files import names_used, read_given_file
 from composer.language.parsing.container_parser import unfold_containers
+from composer.language.paths import with_folder
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import replace_start_values
 from composer.ros_parameters.file_writer import render_parameter_file
@@ -143,8 +144,8 @@ def _check_parameters(system: LoadedSystem) -> list[Diagnostic]:
 def _with_absolute_paths(data: dict[str, Any]) -> dict[str, Any]:
     absolute = dict(data)
     if 'interfaces' in data:
-        folders = data['interfaces'].items()
-        absolute['interfaces'] = {package: _absolute(folder) for package, folder in folders}
+        packages = data['interfaces'].items()
+        absolute['interfaces'] = {name: with_folder(entry, _absolute) for name, entry in packages}
     if 'environment' in data:
         absolute['environment'] = _without_values(data['environment'])
     for section in ('nodes', 'processes', 'workers', 'hosts'):

@@ -22,6 +22,9 @@ from composer.interfaces.definitions.packages import (
 )
 from composer.records import record
 
+# To build so many takes a minute.
+_MANY_INTERFACES = 50
+
 Origin: TypeAlias = Literal['installed', 'cached', 'built']
 
 
@@ -115,7 +118,12 @@ class _Provider:
 
         count = len(definitions.interfaces)
         interfaces = '1 interface' if count == 1 else f'{count} interfaces'
-        self._progress(f'{definitions.package}: building {interfaces} ...')
+        of_all = f' of {count + len(definitions.left_out)}' if definitions.left_out else ''
+        self._progress(f'{definitions.package}: building {interfaces}{of_all} ...')
+        if count > _MANY_INTERFACES:
+            self._progress(
+                f"{definitions.package}: to build less, list what you use under 'only:'"
+            )
         start = time.monotonic()
         build_package(
             definitions,
@@ -164,8 +172,8 @@ def make_importable(package: str, prefix: Path) -> None:
         )
         raise ModuleTakenError(
             message,
-            help='rename one of them; if the definitions changed since the package was imported, '
-            'start again',
+            help='rename one of them; if the definitions, or the list of those to build, changed '
+            'since the package was imported, start again',
         )
 
 

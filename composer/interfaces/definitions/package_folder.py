@@ -5,9 +5,9 @@ See https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 from composer.confidential import may_show_lines
 from composer.diagnostics import Diagnostic, Related, SourceFile, Span, diagnostic_at
@@ -80,6 +80,7 @@ class PackageDefinitions:
             (`example_interfaces/srv/AddTwoInts`).
         references: uses of messages, for `check_definitions`.
         diagnostics: the errors.
+        left_out: the full names of the interfaces that the file does not list and does not need.
     """
 
     package: str
@@ -88,6 +89,31 @@ class PackageDefinitions:
     interfaces: Mapping[str, InterfaceDescription]
     references: tuple[TypeReference, ...]
     diagnostics: tuple[Diagnostic, ...]
+    left_out: frozenset[str] = frozenset()
+
+    def names(self) -> dict[str, str]:
+        """Return the full name of what each file in `sources` defines."""
+        return {source: f'{self.package}/{source.rpartition(".")[0]}' for source in self.sources}
+
+    def without(self, left_out: frozenset[str]) -> Self:
+        """Return the definitions without some interfaces, and without the errors in these."""
+        names = self.names()
+        files = {str(self.folder / source) for source in names if names[source] in left_out}
+        references = [
+            reference for reference in self.references if reference.span.source.name not in files
+        ]
+        return replace(
+            self,
+            sources={name: self.sources[name] for name in names if names[name] not in left_out},
+            interfaces={
+                name: description
+                for name, description in self.interfaces.items()
+                if name not in left_out
+            },
+            references=tuple(references),
+            diagnostics=tuple(error for error in self.diagnostics if error.file not in files),
+            left_out=left_out & {*names.values()},
+        )
 
     def messages(self) -> frozenset[str]:
         """Return the names of the messages, those with errors included, without the package."""

@@ -45,13 +45,17 @@ def _format(diagnostic: Diagnostic) -> str:
 
 
 def load_packages(
-    folders: Mapping[str, Path], catalogue: InterfaceCatalogue
+    folders: Mapping[str, Path],
+    catalogue: InterfaceCatalogue,
+    listed: Mapping[str, Iterable[str]] | None = None,
 ) -> list[PackageDefinitions]:
     """Read the definitions of packages, each in order after those that it uses.
 
     Args:
         folders: the folder of each package's definitions, by its name.
         catalogue: what is installed.
+        listed: what alone is needed of a package, such as `msg/Name`, beside the messages that
+            this and other packages use.
 
     Raises:
         ParserMissingError: `rosidl_adapter` is not installed.
@@ -63,10 +67,34 @@ def load_packages(
         packages.append(load_definitions(package, folder, budget))
         if budget.is_spent:
             raise DefinitionsError([each for one in packages for each in one.diagnostics])
+    if listed:
+        packages = _keep_listed(packages, listed)
     diagnostics = check_definitions(packages, catalogue)
     if diagnostics:
         raise DefinitionsError(diagnostics)
     return order_packages(packages)
+
+
+def _keep_listed(
+    packages: Sequence[PackageDefinitions], listed: Mapping[str, Iterable[str]]
+) -> list[PackageDefinitions]:
+    """Return packages without the interfaces that are neither listed nor used by others."""
+    used: dict[str, list[str]] = {}
+    for reference in (reference for package in packages for reference in package.references):
+        # Parts of services and actions are called `Name_Request` and the like.
+        package, kind, name = reference.user.split('/')
+        user = f'{package}/{kind}/{name.partition("_")[0]}'
+        used.setdefault(user, []).append(reference.message.replace('/', '/msg/'))
+    names = {name for package in packages for name in package.names().values()}
+    pending = [name for name in names if name.partition('/')[0] not in listed]
+    pending += [f'{package}/{name}' for package in listed for name in listed[package]]
+    kept: set[str] = set()
+    while pending:
+        name = pending.pop()
+        if name not in kept:
+            kept.add(name)
+            pending += used.get(name, ())
+    return [package.without(frozenset(names - kept)) for package in packages]
 
 
 def used_packages(definitions: PackageDefinitions) -> frozenset[str]:

@@ -22,7 +22,7 @@ from composer.records import record
 if TYPE_CHECKING:
     from composer.language.includes.include_entry import IncludeEntry
     from composer.language.loaded_system import LoadedSystem
-    from composer.yaml_text.positions import DataPath
+    from composer.yaml_text.positions import Branch, DataPath
 
 
 @record
@@ -234,10 +234,29 @@ class IncludeMerger:
             if name not in declared:
                 declared[name] = entry
                 self._whole.positions.graft(path, branch)
+            elif section == 'interfaces':
+                self._add_interfaces(name, entry, branch)
             elif isinstance(entry, dict) and not is_left_out:
                 added = entry.keys() - declared[name].keys()
                 declared[name] = {**entry, **declared[name]}
                 self._whole.positions.graft(path, branch.only(added))
+
+    def _add_interfaces(self, package: str, entry: str | dict[str, Any], branch: Branch) -> None:
+        """Add the interfaces that a file lists of a package; without a list, it needs all."""
+        declared = self._whole.entries['interfaces'][package]
+        if isinstance(declared, str) or 'only' not in declared:
+            return
+        if isinstance(entry, str) or 'only' not in entry:
+            self._whole.entries['interfaces'][package] = declared['folder']
+            return
+        spans = dict(branch.values)
+        listed = [*declared['only']]
+        self._whole.entries['interfaces'][package] = {**declared, 'only': listed}
+        for index, interface in enumerate(entry['only']):
+            if interface not in listed:
+                at = ('interfaces', package, 'only', len(listed))
+                self._whole.positions.values[at] = spans['only', index]
+                listed.append(interface)
 
 
 def _beside(outer: dict[str, str], inner: dict[str, str] | None) -> dict[str, str]:

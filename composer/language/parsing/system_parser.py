@@ -126,7 +126,11 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         before: See `parse_specs`.
     """
     executor = data.get('executor', {})
-    interfaces = data.get('interfaces', {})
+    packages = data.get('interfaces', {})
+    interfaces = {
+        name: entry if isinstance(entry, str) else entry['folder']
+        for name, entry in packages.items()
+    }
     if any(map(is_container, data.get('processes', {}).values())):
         interfaces = {LOADING_PACKAGE: str(LOADING_DEFINITIONS)} | interfaces
     if any(node.get('bond') for node in data.get('nodes', {}).values()):
@@ -137,6 +141,13 @@ def parse_system(data: Data, name: str, before: LoadedSystem | None = None) -> S
         name=name,
         description=data.get('description', ''),
         interfaces=MappingProxyType(interfaces),
+        listed_interfaces=MappingProxyType(
+            {
+                name: tuple(entry['only'])
+                for name, entry in packages.items()
+                if isinstance(entry, dict) and 'only' in entry
+            }
+        ),
         qos=parse_entries(data, (), 'qos', _parse_named_qos),
         threads=int(executor['threads']) if 'threads' in executor else None,
         shutdown_timeout_sec=float(executor.get('shutdown_timeout', DEFAULT_SHUTDOWN_TIMEOUT_SEC)),
