@@ -6,13 +6,12 @@ Source: https://graphviz.org/doc/info/lang.html, https://graphviz.org/doc/info/s
 from __future__ import annotations
 
 import html
-from itertools import count
 from typing import TYPE_CHECKING
 
 from composer.drawing.shapes import arrange_shapes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator, Mapping
 
     from composer.drawing.picture import Picture
     from composer.drawing.shapes import Line, Region, Shape
@@ -25,6 +24,7 @@ _SHAPES = {
     'service': 'shape=hexagon, style=filled, fillcolor="#fbefff", color="#8250df"',
     'action': 'shape=octagon, style=filled, fillcolor="#dafbe1", color="#1a7f37"',
     'external': 'shape=ellipse, style=dashed, color="#8c959f", fontcolor="#57606a"',
+    'folded': 'shape=box3d, margin="0.2,0.06", style=filled, fillcolor="#eaeef2", color="#57606a"',
 }
 _LINES = {
     'topic': 'color="#57606a"',
@@ -43,37 +43,46 @@ _REGIONS = {
     'worker': 'style=rounded, color="#0969da", penwidth=1.5',
     'host': 'style="rounded,bold", color="#57606a", penwidth=2',
 }
+# Texts beside arrows need room along them.
+_RANK_SEPARATIONS = {'LR': 0.7, 'TB': 0.3}
 _SMALL, _GREY = 9, '#57606a'
 
 
-def render_picture(picture: Picture) -> str:
-    """Return a picture as a directed graph; each element has an `id` and a `class` for SVG."""
-    drawn = arrange_shapes(picture)
-    numbers = count()
+def render_picture(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
+    """Return a picture as a directed graph; each element has an `id` and a `class` for SVG.
+
+    Args:
+        picture: What is drawn.
+        folded: See `arrange_shapes`.
+        direction: Of messages, as Graphviz names it: `LR` or `TB`.
+    """
+    drawn = arrange_shapes(picture, folded)
+    tokens = {region.id: token for token, region in drawn.regions.items()}
+    separation, fonts = _RANK_SEPARATIONS[direction], f'fontname="{_FONT}", fontsize=11'
     lines = [
         f'digraph {_quote(picture.name)} {{',
-        f'  graph [rankdir=LR, ranksep=0.7, nodesep=0.2, fontname="{_FONT}", fontsize=11]',
+        f'  graph [rankdir={direction}, ranksep={separation}, nodesep=0.2, {fonts}]',
         f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
         f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
-        *_region(drawn.root, 1, numbers),
+        *_region(drawn.root, 1, tokens),
         *(f'  {_line(line)}' for line in drawn.lines),
         '}',
     ]
     return '\n'.join(lines) + '\n'
 
 
-def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
+def _region(region: Region, depth: int, tokens: Mapping[str, str]) -> Iterator[str]:
     indent = '  ' * depth
     for shape in region.shapes:
         yield f'{indent}{_shape(shape)}'
     for inner in region.inner.values():
-        number = next(numbers)
-        yield f'{indent}subgraph cluster_{number} {{'
+        token = tokens[inner.id]
+        yield f'{indent}subgraph cluster_{token[1:]} {{'
         yield (
-            f'{indent}  graph [label=<{_text(inner.title)}>, id="g{number}", '
+            f'{indent}  graph [label=<{_text(inner.title)}>, id="{token}", '
             f'class="{inner.kind}", labeljust=l, {_REGIONS[inner.kind]}]'
         )
-        yield from _region(inner, depth + 1, numbers)
+        yield from _region(inner, depth + 1, tokens)
         yield f'{indent}}}'
 
 

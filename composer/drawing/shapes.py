@@ -6,7 +6,8 @@ Shapes have short tokens instead of names: no name can clash with a keyword of a
 from __future__ import annotations
 
 import textwrap
-from dataclasses import field
+from collections import Counter, defaultdict
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 from composer.drawing.delivery import OUTSIDE
@@ -17,7 +18,7 @@ from composer.rules import Severity
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from composer.checks.placement.crossings import Place
     from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
@@ -33,7 +34,8 @@ class Shape:
 
     Attributes:
         id: The id of what it shows; of the channel, if it stands for external ends.
-        kind: `node`, `process`, `topic`, `service`, `action` or `external`.
+        kind: `node`, `process`, `topic`, `service`, `action` or `external`; of a folded region,
+            `folded`.
         details: Smaller lines below the title.
         remarks: The messages of its findings, in lines.
         mark: The worst of its findings, `error` or `warning`; empty if it has none.
@@ -76,12 +78,14 @@ class Region:
 
     Attributes:
         place: `host NAME` or `worker NAME`; empty for a namespace.
+        id: The keys of all regions down to it, as in `box:/worker camera/left`.
     """
 
     namespace: str
     shapes: list[Shape] = field(default_factory=list)
     inner: dict[str, Region] = field(default_factory=dict)
     place: str = ''
+    id: str = 'box:'
 
     @property
     def title(self) -> str:
@@ -100,7 +104,8 @@ class Region:
             if name:
                 # No part of a namespace has a space.
                 key = f'{noun} {name}'
-                region = region.inner.setdefault(key, Region(self.namespace, place=key))
+                inner = Region(self.namespace, place=key, id=f'{region.id}/{key}')
+                region = region.inner.setdefault(key, inner)
         return region
 
     def within(self, namespace: str) -> Region:
@@ -108,20 +113,42 @@ class Region:
         region = self
         for part in (part for part in namespace.split('/') if part):
             full = f'{region.namespace.rstrip("/")}/{part}'
-            region = region.inner.setdefault(part, Region(full))
+            region = region.inner.setdefault(part, Region(full, id=f'{region.id}/{part}'))
         return region
+
+    def walk(self) -> Iterator[Region]:
+        """Yield the regions below this one, each before those in it."""
+        for region in self.inner.values():
+            yield region
+            yield from region.walk()
+
+    def all_shapes(self) -> list[Shape]:
+        """Return the shapes in it and in all regions below."""
+        return [*self.shapes, *(shape for region in self.walk() for shape in region.shapes)]
 
 
 @record
 class Arrangement:
-    """All shapes and lines; shapes without a namespace are in `root` itself."""
+    """All shapes and lines; shapes without a namespace are in `root` itself.
+
+    Attributes:
+        regions: All regions, also those that are in a folded one, by their tokens.
+        stands_in: The token of what is drawn for each shape and line that is not drawn itself.
+    """
 
     root: Region
     lines: tuple[Line, ...]
+    regions: dict[str, Region] = field(default_factory=dict)
+    stands_in: dict[str, str] = field(default_factory=dict)
 
 
-def arrange_shapes(picture: Picture) -> Arrangement:
-    """Return the shapes and lines of a picture."""
+def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
+    """Return the shapes and lines of a picture.
+
+    Args:
+        picture: What is drawn.
+        folded: The ids of regions that are drawn as one shape.
+    """
     root = Region('/')
     remarks = _Remarks(picture)
     tokens = tokens_of(picture)
@@ -138,7 +165,75 @@ def arrange_shapes(picture: Picture) -> Arrangement:
     for index, wait in enumerate(picture.waits):
         ends = tokens[wait.target], tokens[wait.waiter]
         lines.append(Line(f'w{index}', '', 'wait', *ends, details=('before',)))
-    return Arrangement(root, tuple(lines))
+    regions = {f'g{index}': region for index, region in enumerate(root.walk())}
+    drawn = Arrangement(root, tuple(lines), regions)
+    return _fold(drawn, {edge.id: edge.role for edge in picture.edges}, folded)
+
+
+def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) -> Arrangement:
+    tokens = {region.id: token for token, region in drawn.regions.items()}
+    stands_in: dict[str, str] = {}
+
+    def copy(region: Region) -> Region:
+        open_ones = {}
+        shapes = [*region.shapes]
+        for key, inner in region.inner.items():
+            if inner.id not in folded:
+                open_ones[key] = copy(inner)
+                continue
+            token, hidden = tokens[inner.id], inner.all_shapes()
+            shapes.append(_folded_shape(token, inner, hidden))
+            stands_in.update(dict.fromkeys((shape.token for shape in hidden), token))
+            stands_in.update(dict.fromkeys((tokens[each.id] for each in inner.walk()), token))
+        return replace(region, shapes=shapes, inner=open_ones)
+
+    root = copy(drawn.root)
+    bundles: dict[tuple[str, str, str], list[Line]] = defaultdict(list)
+    for line in drawn.lines:
+        start, end = (stands_in.get(token, token) for token in (line.start, line.end))
+        if start == end:
+            stands_in[line.token] = start
+        else:
+            # Lines between the same two shapes are drawn apart, unless one is a folded region.
+            is_single = (start, end) == (line.start, line.end)
+            bundles[start, end, line.token if is_single else line.kind].append(line)
+    lines = []
+    for index, ((start, end, _), bundle) in enumerate(bundles.items()):
+        line = replace(bundle[0], start=start, end=end)
+        if len(bundle) > 1:
+            line = replace(
+                line,
+                token=f'm{index}',
+                id='',
+                details=_count(bundle, roles) or line.details,
+                remarks=(),
+                mark=_worst(bundle),
+            )
+            stands_in.update({each.token: line.token for each in bundle})
+        lines.append(line)
+    return Arrangement(root, tuple(lines), drawn.regions, stands_in)
+
+
+def _folded_shape(token: str, region: Region, hidden: Sequence[Shape]) -> Shape:
+    counts = Counter(shape.kind for shape in hidden if shape.kind != 'external')
+    details = tuple(counted(number, kind) for kind, number in counts.items())
+    return Shape(token, region.id, 'folded', region.title, details, mark=_worst(hidden))
+
+
+def _worst(parts: Sequence[Shape] | Sequence[Line]) -> str:
+    # `error` is before `warning`.
+    return min((part.mark for part in parts if part.mark), default='')
+
+
+def _count(bundle: Sequence[Line], roles: dict[str, str]) -> tuple[str, ...]:
+    counts = Counter(roles[line.id] for line in bundle if line.id)
+    return tuple(counted(number, role) for role, number in counts.items())
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number and a noun, as in `2 processes`."""
+    many = 'processes' if noun == 'process' else f'{noun}s'
+    return f'{number} {noun if number == 1 else many}'
 
 
 def tokens_of(picture: Picture) -> dict[str, str]:

@@ -14,7 +14,7 @@ from composer.names import join_names
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from composer.drawing.picture import Picture
 
@@ -22,13 +22,18 @@ _COMMENT = re.compile(r'<!--.*?-->\n?', re.DOTALL)
 _TITLE = re.compile(r'(<g id="([^"]*)"[^>]*>\n)<title>[^<]*</title>\n')
 
 
-def render_picture(picture: Picture) -> str:
+def render_picture(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
     """Return a picture as an SVG document.
+
+    Args:
+        picture: What is drawn.
+        folded: See `arrange_shapes`.
+        direction: See `dot.render_picture`.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
     """
-    drawn = _COMMENT.sub('', lay_out(dot.render_picture(picture)))
+    drawn = _COMMENT.sub('', lay_out(dot.render_picture(picture, folded, direction)))
     titles = dict(_titles(picture))
 
     def entitle(match: re.Match[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,24 +13,27 @@ from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
 from composer.drawing.qos_labels import describe_policies
-from composer.drawing.shapes import tokens_of
+from composer.drawing.shapes import arrange_shapes, counted, tokens_of
 from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.bindings import node_bindings
 from composer.names import join_names
 from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator, Mapping
 
     from composer.checks.context import CheckContext
     from composer.drawing.excerpts import Excerpt
     from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
+    from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
 
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
 # Of a topic with many ends, the lines of the first ones.
 _MOST_ENDS = 6
 _MOST_CODE_LINES = 15
+# What is left for the drawing in a window of 1440 by 900.
+_STAGE = 680, 850
 
 
 def list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
@@ -59,23 +62,36 @@ def _find_code(context: CheckContext, behaviour: BehaviourSpec) -> dict[str, Any
 
 
 def describe_drawing(
-    picture: Picture, code: dict[str, list[dict[str, Any]]] | None = None
+    picture: Picture,
+    code: dict[str, list[dict[str, Any]]] | None = None,
+    folded: Collection[str] = (),
+    direction: str = '',
 ) -> dict[str, Any]:
     """Return a picture as the page takes it: its SVG, and its parts by their tokens.
 
     Args:
         code: See `list_code`.
+        folded: See `arrange_shapes`.
+        direction: `LR` or `TB`; empty for the one that is read with less zooming.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
     """
+    drawn = arrange_shapes(picture, folded)
+    documents = {
+        each: _inlined(svg.render_picture(picture, folded, each))
+        for each in ([direction] if direction else ['LR', 'TB'])
+    }
+    direction = min(documents, key=lambda each: _shrinkage(documents[each]))
     return {
         'name': picture.name,
         'description': picture.description,
-        'svg': _inlined(svg.render_picture(picture)),
+        'svg': documents[direction],
+        'direction': direction,
         'code': code or {},
         'folder': str(Path.cwd()),
-        **_describe(picture),
+        'stands_in': drawn.stands_in,
+        **_describe(picture, drawn),
     }
 
 
@@ -85,8 +101,15 @@ def _inlined(document: str) -> str:
     return _OPENING.sub(opening, document, count=1).rstrip()
 
 
-def _describe(picture: Picture) -> dict[str, Any]:
+def _shrinkage(document: str) -> float:
+    *_, width, height = map(float, document.split('"', 4)[3].split())
+    return max(width / _STAGE[0], height / _STAGE[1])
+
+
+def _describe(picture: Picture, drawn: Arrangement) -> dict[str, Any]:
     parts = dict(_parts(picture))
+    parts |= {token: _box(region, drawn, parts) for token, region in drawn.regions.items()}
+    parts |= dict(_bundles(drawn, parts))
     owners: dict[int, str] = {}
     for token, part in parts.items():
         for index in part['findings']:
@@ -118,6 +141,49 @@ def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
         near = [tokens[edge.node], tokens[edge.channel]]
         words = _describe_edge(edge, names[edge.node])
         yield tokens[edge.id], _part(words, edge, near, excerpts.of(edge.path))
+
+
+def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the data of a region; `near` are the ends in it of what crosses its border."""
+    members = {shape.token: shape.kind for shape in region.all_shapes()}
+    near = [
+        token
+        for token, part in parts.items()
+        if token[0] == 'e' and len(members.keys() & set(part['near'])) == 1
+    ]
+    counts = Counter(members.values())
+    return {
+        'id': region.id,
+        'kind': region.kind,
+        'name': region.title.removeprefix(f'{region.kind} '),
+        'facts': [', '.join(counted(number, kind) for kind, number in counts.items())],
+        'folded': region.id in {shape.id for shape in drawn.root.all_shapes()},
+        'members': list(members),
+        'findings': (),
+        'near': near,
+        'excerpts': [],
+    }
+
+
+def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the data of each line that stands for several."""
+    for line in drawn.lines:
+        near = [token for token, shown in drawn.stands_in.items() if shown == line.token]
+        near = [token for token in near if token in parts]
+        if near:
+            start, end = (parts[token] for token in (line.start, line.end))
+            yield (
+                line.token,
+                {
+                    'id': f'lines:{start["id"]}>{end["id"]}',
+                    'kind': 'connections',
+                    'name': f'{start["name"]} to {end["name"]}',
+                    'facts': line.details,
+                    'findings': (),
+                    'near': near,
+                    'excerpts': [],
+                },
+            )
 
 
 def _ends(picture: Picture) -> dict[str, list[Edge]]:
@@ -161,4 +227,9 @@ def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:
     qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
     delivery = [f'delivery: {edge.delivery}'] if edge.delivery.way else []
     facts = [edge.type, *qos, *delivery, *filter(None, [edge.followed])]
-    return {'kind': edge.role, 'name': f'{edge.name} of {owner}', 'facts': facts}
+    return {
+        'kind': edge.role,
+        'name': f'{edge.name} of {owner}',
+        'facts': facts,
+        'leaves_node': edge.begins_at_node,
+    }

@@ -2,6 +2,7 @@
 // Everything shown comes from the data of the page, and is set as text, never as markup.
 const stage = document.getElementById('stage');
 const search = document.getElementById('search');
+const isolation = document.getElementById('isolation');
 const MOST_MATCHES = 200;
 const MOST_LINES = 300;
 const MOST_POINTS = 60;
@@ -10,6 +11,11 @@ const byId = (id) => document.getElementById(id);
 // What is shown: the drawing with its parts by token, and the latest state.
 let svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
 let parts = new Map();
+// What is drawn for parts that are in a folded box, by their tokens.
+let standsIn = {};
+const folded = new Set();
+// The connections that begin or end at a part, with their other ends.
+const flows = {down: new Map(), up: new Map()};
 let findings = [];
 let code = {};
 let folder = '';
@@ -145,47 +151,144 @@ function describe(token) {
   for (const excerpt of code[part.id.slice(5)] ?? []) {
     if (part.kind === 'node') details.append(makeExcerpt(excerpt));
   }
-  if (part.near.length) {
-    const list = make('ul');
-    for (const near of part.near) {
-      // From a node past its publisher, say, to the topic.
-      const far = near[0] === 'e' ? parts.get(near).near.find((each) => each !== token) : near;
-      list.append(makeLink(far, `${parts.get(near).kind} ${parts.get(far).name}`));
-    }
-    details.append(make('h2', 'Connected'), list);
+  if (part.members) {
+    const button = make('button', part.folded ? 'Unfold' : 'Fold');
+    button.type = 'button';
+    button.addEventListener('click', () => fold(part));
+    const inside = make('details');
+    inside.append(make('summary', `In it (${part.members.length})`), makeLinks(part.members.map(
+      (each) => [each, `${parts.get(each).kind} ${parts.get(each).name}`],
+    )));
+    details.append(button, inside);
   }
+  // From a node past its publisher, say, to the topic.
+  const within = new Set([token, ...part.members ?? []]);
+  const ends = part.near.map((near) => {
+    const far = near[0] === 'e' && token[0] !== 'm'
+      ? parts.get(near).near.find((each) => !within.has(each)) : near;
+    return [far, `${parts.get(near).kind} ${parts.get(far).name}`];
+  });
+  if (ends.length) details.append(make('h2', 'Connected'), makeLinks(ends));
+}
+
+function makeLinks(ends) {
+  const list = make('ul');
+  for (const [text, token] of new Map(ends.map(([token, text]) => [text, token]))) {
+    list.append(makeLink(token, text));
+  }
+  return list;
 }
 
 // Selection, by pointer, keyboard, list or address.
-const shapeOf = (token) => document.getElementById(token);
+const shapeOf = (token) => document.getElementById(standsIn[token] ?? token);
 let chosen = null;
 
-function choose(token, mustBeSeen) {
-  for (const element of svg.querySelectorAll('.chosen, .near')) {
-    element.classList.remove('chosen', 'near');
+// Gives a class to what is drawn for these parts, and to nothing else.
+function paint(name, tokens) {
+  for (const element of svg.querySelectorAll(`.${name}`)) element.classList.remove(name);
+  for (const token of tokens) shapeOf(token)?.classList.add(name);
+}
+
+// Returns what is up- or downstream of a part, with the connections on the way.
+function reach(token) {
+  const part = parts.get(token);
+  const mode = isolation.value;
+  const found = new Set([token]);
+  const starts = part.members ?? (token[0] === 'm' ? part.near.flatMap((each) => [...ends(each)])
+    : token[0] === 'e' ? part.near : [token]);
+  for (const way of mode === 'near' || mode === 'both' ? ['up', 'down'] : [mode]) {
+    const seen = new Set(token[0] === 'm' ? part.near.map((each) => ends(each)[way === 'up' ? 0 : 1])
+      : token[0] === 'e' ? [ends(token)[way === 'up' ? 0 : 1]] : starts);
+    for (const end of seen) {
+      found.add(end);
+      // The neighbours of a node are behind its topics.
+      if (mode === 'near' && end[0] === 'n' && !starts.includes(end)) continue;
+      for (const [edge, far] of flows[way].get(end) ?? []) found.add(edge) && seen.add(far);
+    }
   }
+  for (const each of token[0] === 'm' ? part.near : starts) found.add(each);
+  return found;
+}
+
+// Returns where messages, calls or goals of a connection begin, and where they end.
+function ends(token) {
+  const part = parts.get(token);
+  return part.leaves_node ? part.near : [...part.near].reverse();
+}
+
+function isolate() {
+  const isolated = chosen !== null && isolation.value !== 'off';
+  svg.classList.toggle('choosing', isolated);
+  const found = isolated ? [...reach(chosen)] : [];
+  // The ends outside belong to their topics.
+  paint('near', [...found, ...found.flatMap((each) => ['p', 'pl', 'u', 'ul'].map((end) => `x${each}${end}`))]);
+}
+
+// The address has all of the view: the selection first.
+function remember() {
+  const view = new URLSearchParams();
+  for (const id of folded) view.append('fold', id);
+  if (search.value) view.set('search', search.value);
+  if (isolation.value !== 'both') view.set('isolate', isolation.value);
+  const texts = [encodeURIComponent(parts.get(chosen)?.id ?? ''), view.toString()];
+  const hash = texts.filter((each, index) => each || (index === 0 && texts[1])).join('&');
+  history.replaceState(null, '', hash ? `#${hash}` : location.pathname);
+}
+
+// Returns the id of what is selected in the address, and sets the rest of the view from it.
+function restore() {
+  const [id, ...rest] = location.hash.slice(1).split('&');
+  const view = new URLSearchParams(rest.join('&'));
+  folded.clear();
+  for (const each of view.getAll('fold')) folded.add(each);
+  search.value = view.get('search') ?? '';
+  isolation.value = view.get('isolate') ?? 'both';
+  if (!isolation.value) isolation.value = 'both';
+  try { return decodeURIComponent(id); } catch { return ''; }
+}
+
+function fold(part) {
+  if (!folded.delete(part.id)) folded.add(part.id);
+  return draw(part.id);
+}
+
+function foldAll() {
+  const ids = [...parts.values()].filter((part) => part.members).map((part) => part.id);
+  if (folded.size) folded.clear();
+  else for (const id of ids) folded.add(id);
+  draw();
+}
+
+// A box folds or unfolds; all else is selected.
+function press(token) {
+  const part = parts.get(token);
+  if (part?.members) fold(part);
+  else choose(token, false);
+}
+
+function choose(token, mustBeSeen) {
   chosen = parts.has(token) ? token : null;
-  svg.classList.toggle('choosing', chosen !== null);
-  history.replaceState(null, '', chosen === null ? ' ' : `#${encodeURIComponent(parts.get(chosen).id)}`);
+  remember();
   describe(chosen);
   showLive();
   askParameters();
   offerMessage();
   offerActs();
   showLog();
-  if (chosen === null) return;
-  shapeOf(token).classList.add('chosen', 'near');
-  for (const near of parts.get(token).near) {
-    shapeOf(near).classList.add('near');
-    for (const far of parts.get(near).near) if (near[0] === 'e') shapeOf(far).classList.add('near');
-  }
-  if (mustBeSeen) bringIn(shapeOf(token));
+  paint('chosen', chosen === null ? [] : [chosen]);
+  isolate();
+  if (chosen !== null && mustBeSeen) bringIn(shapeOf(token));
 }
 
 function makeSelectable(token, part) {
-  const element = shapeOf(token);
+  const element = document.getElementById(token);
+  if (!element) return;
   element.classList.add('known');
-  if (token[0] === 'e') {
+  if (part.members) {
+    element.querySelector('text').prepend(part.folded ? '▸ ' : '▾ ');
+    element.setAttribute('aria-expanded', String(!part.folded));
+  }
+  if ('em'.includes(token[0])) {
     const reach = element.querySelector('path').cloneNode();
     reach.setAttribute('class', 'reach');
     element.append(reach);
@@ -198,7 +301,7 @@ function makeSelectable(token, part) {
   element.addEventListener('keydown', (event) => {
     if (event.key !== 'Enter' && event.key !== ' ') return;
     event.preventDefault();
-    choose(token, false);
+    press(token);
   });
 }
 
@@ -219,7 +322,7 @@ stage.addEventListener('pointermove', (event) => {
   show({...drag.view, x: drag.view.x - across * scale, y: drag.view.y - down * scale});
 });
 stage.addEventListener('pointerup', (event) => {
-  if (drag && !drag.moved) choose(event.target.closest('.known')?.id, false);
+  if (drag && !drag.moved) press(event.target.closest('.known')?.id);
   drag = null;
 });
 stage.addEventListener('pointercancel', () => { drag = null; });
@@ -236,7 +339,7 @@ stage.addEventListener('wheel', (event) => {
 const KEYS = {
   ArrowLeft: () => move(-0.1, 0), ArrowRight: () => move(0.1, 0),
   ArrowUp: () => move(0, -0.1), ArrowDown: () => move(0, 0.1),
-  '+': () => zoom(0.8), '=': () => zoom(0.8), '-': () => zoom(1.25), 0: fit,
+  '+': () => zoom(0.8), '=': () => zoom(0.8), '-': () => zoom(1.25), 0: fit, f: foldAll,
 };
 stage.addEventListener('keydown', (event) => {
   if (!(event.key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -256,17 +359,19 @@ document.addEventListener('keydown', (event) => {
 document.getElementById('zoom-in').addEventListener('click', () => zoom(0.8));
 document.getElementById('zoom-out').addEventListener('click', () => zoom(1.25));
 document.getElementById('fit').addEventListener('click', fit);
+byId('fold-all').addEventListener('click', foldAll);
+isolation.addEventListener('change', () => { isolate(); remember(); });
 
 // The search: each word must be in the kind, the name or the facts.
 function find() {
   const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
-  const found = [];
+  const matching = [];
   for (const [token, part] of parts) {
     const text = [part.kind, part.name, ...part.facts].join('\n').toLowerCase();
-    const matches = words.length > 0 && words.every((word) => text.includes(word));
-    shapeOf(token).classList.toggle('match', matches);
-    if (matches && token[0] !== 'e') found.push(token);
+    if (words.length && words.every((word) => text.includes(word))) matching.push(token);
   }
+  paint('match', matching);
+  const found = matching.filter((token) => !'em'.includes(token[0]));
   svg.classList.toggle('searching', words.length > 0);
   byId('count').textContent = words.length ? `${found.length} found` : '';
   byId('found').hidden = words.length === 0;
@@ -275,7 +380,7 @@ function find() {
   ));
   return found;
 }
-search.addEventListener('input', find);
+search.addEventListener('input', () => { find(); remember(); });
 search.addEventListener('keydown', (event) => {
   if (event.key !== 'Enter') return;
   // Enter goes from one match to the next.
@@ -289,15 +394,29 @@ async function get(path) {
   return answer.json();
 }
 
-async function draw() {
-  const drawing = await get('api/drawing');
-  const before = chosen === null ? decodeURIComponent(location.hash.slice(1)) : parts.get(chosen).id;
+let asked = 0;
+
+async function draw(selected = parts.get(chosen)?.id ?? restore()) {
+  const turn = ++asked;
+  const words = [...folded].map((id) => `folded=${encodeURIComponent(id)}`).join('&');
+  const drawing = await get(`api/drawing?${words}`);
+  // Who folds two boxes in a row sees the second drawing.
+  if (turn !== asked) return;
+  const hasFocus = svg.contains(document.activeElement);
   parts = new Map(Object.entries(drawing.parts ?? {}));
   findings = drawing.findings ?? [];
   code = drawing.code ?? {};
   folder = drawing.folder ?? '';
   tokens.clear();
-  for (const [token, part] of parts) tokens.set(part.id, token);
+  standsIn = drawing.stands_in ?? {};
+  for (const way of Object.values(flows)) way.clear();
+  for (const [token, part] of parts) {
+    tokens.set(part.id, token);
+    if (token[0] !== 'e') continue;
+    const [start, end] = ends(token);
+    flows.down.set(start, [...flows.down.get(start) ?? [], [token, end]]);
+    flows.up.set(end, [...flows.up.get(end) ?? [], [token, start]]);
+  }
   if (drawing.svg) {
     const made = new DOMParser().parseFromString(drawing.svg, 'image/svg+xml').documentElement;
     const box = made.viewBox.baseVal;
@@ -313,7 +432,8 @@ async function draw() {
   find();
   showTree();
   // Until there is a drawing, the address keeps what is wanted.
-  if (parts.size) choose(tokens.get(before), false);
+  if (parts.size) choose(tokens.get(selected), false);
+  if (hasFocus) shapeOf(chosen)?.focus();
   mark();
 }
 
@@ -341,17 +461,26 @@ function levelsOfNodes() {
 function mark() {
   const levels = levelsOfNodes();
   const runs = new Set(state.status?.nodes ?? []);
-  const drops = new Set(rows().filter((row) => levelOf(row) !== 'ok').map(keyOf));
-  for (const [token, part] of parts) {
-    const element = shapeOf(token);
-    if (!element) continue;
-    const name = part.id.slice(part.id.indexOf(':') + 1);
-    const isNode = part.kind === 'node';
-    const level = isNode ? levels.get(name) ?? 'ok' : 'ok';
-    element.classList.toggle('hurts', isNode ? level === 'error' : drops.has(part.id));
-    element.classList.toggle('warns', isNode && (level === 'warn' || level === 'stale'));
-    element.classList.toggle('absent', isNode && state.runs === true && !runs.has(name));
-  }
+  const tokensOf = (test) => [...levels].filter(test).map(([name]) => tokens.get(`node:${name}`));
+  const drops = rows().filter((row) => levelOf(row) !== 'ok').map((row) => tokens.get(keyOf(row)));
+  const nodes = [...parts].filter(([token, part]) => part.kind === 'node' && !standsIn[token]);
+  paint('hurts', [...tokensOf(([, level]) => level === 'error'), ...drops.filter((each) => shapeOf(each)?.matches('.edge'))]);
+  paint('warns', tokensOf(([, level]) => level === 'warn' || level === 'stale'));
+  paint('absent', nodes.filter(([, part]) => state.runs === true && !runs.has(part.id.slice(5)))
+    .map(([token]) => token));
+  for (const [token, part] of parts) if (token[0] === 'm') addUp(token, part);
+}
+
+// A line that stands for several shows how much goes over all of them.
+function addUp(token, part) {
+  const texts = byId(token).querySelectorAll('text');
+  part.facts.forEach((fact, index) => {
+    const ids = new Set(part.near.map((each) => parts.get(each))
+      .filter((each) => fact.includes(each.kind)).map((each) => each.id));
+    const crossing = rows().filter((row) => ids.has(keyOf(row)));
+    const rate = crossing.reduce((sum, row) => sum + (row.rate_hz ?? 0), 0);
+    if (texts[index]) texts[index].textContent = crossing.length ? `${fact}, ${number(rate)} Hz` : fact;
+  });
 }
 
 // Items stay as they are while they are about the same: who is about to click, or has the focus,
@@ -455,26 +584,40 @@ function showLive() {
   const live = byId('live');
   if (!found.length) { live.replaceChildren(); return; }
   const table = make('table');
-  const titles = ['', 'Hz', '', 'mean ms', 'p99 ms', 'core %', 'queue', 'drops', 'late', 'errors'];
+  const titles = ['Hz', '', 'mean ms', 'p99 ms', 'core %', 'queue', 'drops', 'late', 'errors'];
   const header = make('tr');
   for (const title of titles) header.append(make('th', title));
   table.append(header);
-  for (const row of found) {
-    const line = make('tr', '', levelOf(row));
+  const isSum = 'gm'.includes(chosen[0]);
+  for (const row of isSum ? [sumOf(found), ...found] : found) {
+    // Names are long: each has a line of its own, above its figures.
+    const about = make('tr', '', levelOf(row));
+    const line = make('tr');
     const name = make('td', `${row.kind} ${row.name}`);
+    name.colSpan = titles.length;
+    about.append(name);
     const way = [row.delivery, row.delivery_reason].filter(Boolean).join(', ');
     if (way) name.append(make('br'), make('span', way, 'kind'));
     if (levelOf(row) !== 'ok' && row.message) name.append(make('br'), make('span', row.message));
     const spark = make('td');
     spark.append(sparkline(rates.get(keyOf(row)) ?? []));
-    line.append(name, make('td', number(row.rate_hz)), spark);
+    line.append(make('td', number(row.rate_hz)), spark);
     const cells = [number(row.mean_ms, 2), number(row.p99_ms, 2),
       row.cpu === null ? '–' : number(100 * row.cpu), number(row.queued, 0), number(row.dropped, 0),
       number(row.late, 0), number(row.errors, 0)];
     for (const cell of cells) line.append(make('td', cell));
-    table.append(line);
+    table.append(about, line);
   }
-  live.replaceChildren(make('h2', 'Now'), table);
+  live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now'), table);
+}
+
+// Adds up the figures of entities.
+function sumOf(found) {
+  const sum = {kind: 'all', name: found.length, node: ''};
+  for (const key of ['rate_hz', 'cpu', 'queued', 'dropped', 'late', 'errors']) {
+    sum[key] = found.reduce((total, row) => total + (row[key] ?? 0), 0);
+  }
+  return sum;
 }
 
 async function askParameters() {
@@ -657,7 +800,10 @@ function take(next) {
 }
 
 window.addEventListener('resize', () => show(shaped(view)));
-window.addEventListener('hashchange', () => parts.size && choose(tokens.get(decodeURIComponent(location.hash.slice(1))), true));
+window.addEventListener('hashchange', async () => {
+  await draw(restore());
+  if (chosen !== null) bringIn(shapeOf(chosen));
+});
 setInterval(showSummary, 1000);
 const events = new EventSource('api/events');
 events.addEventListener('message', (event) => take(JSON.parse(event.data)));

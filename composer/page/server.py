@@ -230,8 +230,13 @@ class PageServer:
     def _shown(self) -> dict[str, Any]:
         return {**self._source.state, **self._settings}
 
-    async def _drawing(self, _request: Request) -> Response:
-        return _json(self._source.drawing)
+    async def _drawing(self, request: Request) -> Response:
+        drawing = self._source.drawing
+        if drawing is None:
+            return _json({})
+        folded = frozenset(request.query_params.getlist('folded'))
+        # Graphviz takes a while.
+        return _json(await asyncio.to_thread(drawing.fold, folded))
 
     async def _log(self, request: Request) -> Response:
         after = request.query_params.get('after', '0')

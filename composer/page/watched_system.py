@@ -29,10 +29,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Future
 
+    from composer.drawing.picture import Picture
+
 _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
 _STATUS_PERIOD_SEC = 2.0
 _POLL_SEC = 0.1
+_MOST_FOLDED = 16
 _MOST_LINES = 500
 _LONGEST_LINE = 2000
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
@@ -40,8 +43,8 @@ _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
 
 def draw_files(
     paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
-) -> dict[str, Any]:
-    """Return the drawing of a system with its findings; see `describe_drawing`.
+) -> Drawing:
+    """Return the drawing of a system with its findings.
 
     Raises:
         ComposerError: The files cannot be read, or there is no Graphviz.
@@ -52,7 +55,39 @@ def draw_files(
     if context is None:
         texts = [f'{each.span or each.file}: {each.message}' for each in findings]
         raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
-    return describe_drawing(build_picture(context, findings), list_code(context))
+    return Drawing(build_picture(context, findings), list_code(context))
+
+
+class Drawing:
+    """A system as it is drawn, as a whole and with folded boxes.
+
+    Attributes:
+        shown: See `describe_drawing`; nothing is folded.
+
+    Raises:
+        DrawingError: Graphviz is missing or failed.
+    """
+
+    def __init__(self, picture: Picture, code: dict[str, list[dict[str, Any]]]) -> None:
+        self._picture = picture
+        self._code = code
+        self.shown = describe_drawing(picture, code)
+        self._lock = threading.Lock()
+        self._folded: dict[frozenset[str], dict[str, Any]] = {}
+
+    def fold(self, folded: frozenset[str]) -> dict[str, Any]:
+        """Return it with these boxes folded; one at a time, and the last ones are kept."""
+        folded &= {part['id'] for part in self.shown['parts'].values() if 'members' in part}
+        if not folded:
+            return self.shown
+        with self._lock:
+            if folded not in self._folded:
+                if len(self._folded) >= _MOST_FOLDED:
+                    self._folded.pop(next(iter(self._folded)))
+                self._folded[folded] = describe_drawing(
+                    self._picture, self._code, folded, self.shown['direction']
+                )
+            return self._folded[folded]
 
 
 class DrawnFiles:
@@ -60,15 +95,16 @@ class DrawnFiles:
 
     Attributes:
         state: What the page shows, but for the drawing.
-        drawing: See `describe_drawing`; empty for none.
+        drawing: Of its files; `None` if they cannot be drawn.
         changed: Called after each change of one of them.
     """
 
     def __init__(
         self, paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
     ) -> None:
-        self.drawing: dict[str, Any] = draw_files(paths, words, set_values)
-        self.state: dict[str, Any] = {'name': self.drawing['name'], 'runs': False, 'drawing': 1}
+        self.drawing: Drawing | None = draw_files(paths, words, set_values)
+        name = self.drawing.shown['name']
+        self.state: dict[str, Any] = {'name': name, 'runs': False, 'drawing': 1}
         self.log: deque[dict[str, Any]] = deque()
         self.system = None
         self.changed: Callable[[], object] = lambda: None
@@ -93,7 +129,7 @@ class WatchedSystem:
 
     def __init__(self, name: str | None) -> None:
         self._name = name
-        self.drawing: dict[str, Any] = {}
+        self.drawing: Drawing | None = None
         self.state: dict[str, Any] = {'name': name or '', 'runs': False}
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
         self.system: RunningSystem | None = None
@@ -184,7 +220,7 @@ class WatchedSystem:
             self.drawing = draw_files(paths, given['words'], given['set_values'])
         except (ComposerError, DrawingError) as error:
             # The page is for the same computer as the files, and shows the rest without.
-            self.drawing, problem = {}, str(error)
+            self.drawing, problem = None, str(error)
         number = self.state.get('drawing', 0) + 1
         self._tell({**self.state, 'drawing': number, 'drawing_problem': problem})
 

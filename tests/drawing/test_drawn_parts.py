@@ -133,3 +133,39 @@ def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
     ids = ids_of(describe_drawing(draw(text)))
     assert sum(bool(re.fullmatch(r'n\d+', each)) for each in ids if each) == 200
     assert sum(bool(re.fullmatch(r'e\d+', each)) for each in ids if each) == 400
+
+
+FOLDABLE = """
+    version: 1
+    nodes:
+      left: {namespace: /a/b, publishers: {one: &topic {topic: /one, type: std_msgs/msg/String, external: true}, two: {topic: /two, type: std_msgs/msg/String}}}
+      right: {namespace: /a, publishers: {one: *topic, two: {topic: /two, type: std_msgs/msg/String}}}
+      ear: {namespace: /c, subscriptions: {one: *topic, two: {topic: /two, type: std_msgs/msg/String, behaviour: 'x:y'}}}
+      inner: {namespace: /a/b, publishers: {own: std_msgs/msg/String}, subscriptions: {own: {type: std_msgs/msg/String, behaviour: 'x:y'}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('folded', 'boxes', 'lines'),
+    [
+        (['box:/a/b'], {'box:/a/b'}, set()),
+        (['box:/a'], {'box:/a'}, {('2 publishers',)}),
+        (['box:/a/b', 'box:/a'], {'box:/a'}, {('2 publishers',)}),
+        (['box:/c', 'box:/nothing'], {'box:/c'}, set()),
+    ],
+    ids=str,
+)
+def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, boxes, lines):
+    data = as_json(describe_drawing(draw(FOLDABLE), folded=folded))
+    parts, drawn = data['parts'], ids_of(data)
+    shown = {token: data['stands_in'].get(token, token) for token in parts}
+    assert set(shown.values()) <= drawn
+    assert drawn & set(data['stands_in']) == set()
+    assert {part['id'] for part in parts.values() if part.get('folded')} == boxes
+    assert {tuple(part['facts']) for token, part in parts.items() if token[0] == 'm'} == lines
+    # The border is crossed by what has one end in it.
+    for box in (part for part in parts.values() if 'members' in part):
+        for token in parts:
+            if token[0] == 'e':
+                inside = [end in box['members'] for end in parts[token]['near']]
+                assert (token in box['near']) == (sum(inside) == 1)

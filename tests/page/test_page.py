@@ -9,7 +9,8 @@ import signal
 import socket
 import subprocess
 import sys
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -299,7 +300,7 @@ def test_a_file_is_shown_that_does_not_run(page, shared_compose):
     assert drawing['code']['/ear'][0]['lines'][0] == 'def hear(node, message):'
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def browser():
     webdriver = pytest.importorskip('selenium.webdriver')
     if not (shutil.which('chromium') and shutil.which('chromedriver')):
@@ -312,6 +313,14 @@ def browser():
     browser = webdriver.Chrome(options=options, service=service)
     yield browser
     browser.quit()
+
+
+def find_all(browser, selector):
+    return browser.find_elements('css selector', selector)
+
+
+def read_text(browser, selector):
+    return browser.execute_script(f'return document.querySelector("{selector}")?.innerText ?? ""')
 
 
 def find_violations(browser, rest):
@@ -327,17 +336,59 @@ def find_violations(browser, rest):
     ]
 
 
+def test_boxes_fold_and_the_address_has_the_view(page, browser):
+    from selenium.common import StaleElementReferenceException
+    from selenium.webdriver import ActionChains, Keys
+
+    find, text_of = partial(find_all, browser), partial(read_text, browser)
+
+    def names_of(style):
+        script = (
+            'return [...document.querySelectorAll(arguments[0])].map((each) => each.ariaLabel)'
+        )
+        return set(browser.execute_script(script, f'main svg .node.{style}'))
+
+    def click(selector):
+        def done():
+            # It may be drawn anew meanwhile.
+            with suppress(StaleElementReferenceException):
+                for each in find(selector)[:1]:
+                    each.click()
+                    return True
+            return False
+
+        wait_for(done, selector)
+
+    browser.get(page.address)
+    # A box folds by a click and unfolds by the keyboard; what crosses its border is added up.
+    browser.get(f'http://127.0.0.1:{page.port}/#&isolate=down')
+    click('main svg .cluster text')
+    wait_for(lambda: find('main svg .folded.chosen'), 'the folded box')
+    assert not find('[aria-label="node /left/talker"]')
+    assert 'fold=box%3A%2Fleft' in browser.current_url
+    wait_for(lambda: re.search(r'all 1\s+\d', text_of('#live')), 'the sum')
+    browser.refresh()
+    wait_for(lambda: find('main svg .folded.chosen'), 'the view of the address')
+    shown = {'namespace /left', 'topic /left/words', 'node /ear'}
+    wait_for(lambda: names_of('near') == shown, 'what is downstream')
+    browser.execute_script('document.querySelector(".folded").focus()')
+    ActionChains(browser).send_keys(Keys.ENTER).perform()
+    wait_for(lambda: find('main svg .cluster.chosen[aria-expanded=true]'), 'the open box')
+    label = 'return document.activeElement.ariaLabel'
+    wait_for(lambda: browser.execute_script(label) == 'namespace /left', 'the focus')
+    # A click isolates what is downstream, or upstream.
+    click('[aria-label="topic /left/words"] text')
+    wait_for(lambda: names_of('near') == {'topic /left/words', 'node /ear'}, 'what is downstream')
+    upstream = {'topic /left/words', 'node /left/talker', 'service /left/switch'}
+    click('#isolation option[value=up]')
+    wait_for(lambda: names_of('near') == upstream, 'what is upstream')
+    assert browser.current_url.endswith('#topic%3A%2Fleft%2Fwords&isolate=up')
+
+
 def test_a_browser_shows_it(page, acting, shared_compose, browser):
     from selenium.webdriver import Keys
 
-    def find(selector):
-        return browser.find_elements('css selector', selector)
-
-    def text_of(selector):
-        return browser.execute_script(
-            f'return document.querySelector("{selector}")?.innerText ?? ""'
-        )
-
+    find, text_of = partial(find_all, browser), partial(read_text, browser)
     browser.get(page.address)
     wait_for(lambda: 'subscription words of /ear' in text_of('#problems'), 'the problem')
     wait_for(lambda: find('main svg .node.hurts, main svg .node.warns'), 'the node that hurts')
