@@ -196,6 +196,18 @@ def test_a_behaviour_may_end_the_system_with_an_exit_code(compose, code):
     assert child.lines[-1] == '[INFO] [ender]: stopping'
 
 
+def test_an_exit_code_that_is_no_number_is_an_error_of_the_behaviour(compose):
+    text = """
+        version: 1
+        nodes: {ender: {timers: {end: {rate: 50, behaviour: 'parts:end', with: {code: done}}}}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line("TypeError: 'str' object cannot be interpreted as an integer")
+    child.send(signal.SIGINT)
+
+    assert child.wait() == 0
+
+
 def test_on_start_may_end_the_system(compose):
     text = """
         version: 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from functools import partial
+from operator import index
 from typing import TYPE_CHECKING
 
 from rclpy.logging import get_logger
@@ -48,7 +49,7 @@ class Process:
 
     def shutdown(self, code: int = 0) -> None:
         """Stop the whole system, after this behaviour has returned, with an exit code."""
-        self._shutdown(code)
+        self._shutdown(index(code))
 
 
 class ExitActions:

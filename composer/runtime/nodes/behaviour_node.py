@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import threading
 from collections.abc import Iterator, Mapping
+from operator import index
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from composer.entity_kinds import KIND_OF_SECTION
@@ -357,7 +358,7 @@ class Node:
 
     def shutdown(self, code: int = 0) -> None:
         """Stop the whole system, after this behaviour has returned, with an exit code."""
-        self._shutdown(code)
+        self._shutdown(index(code))
 
     def _entity(self, section: str, name: str) -> Any:
         entities = self._entities[section]
