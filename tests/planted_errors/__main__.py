@@ -1,9 +1,10 @@
-"""python -m tests.planted_errors --systems 2000 --seed 1"""
+"""python -m tests.planted_errors [--behaviours | --systems 2000 --seed 1]"""
 
 import argparse
 import tempfile
 from pathlib import Path
 
+from tests.planted_errors.behaviours import ROWS, measure_behaviours
 from tests.planted_errors.measurement import measure
 
 
@@ -14,7 +15,15 @@ def main():
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--errors', type=int, default=4, help='the most errors of one file')
     parser.add_argument('--show', type=int, default=10, help='how many missed ones are shown')
+    parser.add_argument('--behaviours', action='store_true', help='those of behaviours instead')
     arguments = parser.parse_args()
+    if arguments.behaviours:
+        with tempfile.TemporaryDirectory() as folder:
+            missed = measure_behaviours(Path(folder))
+        for case in missed:
+            print(*case[:3], sep=' | ')
+        print(f'{len(ROWS) - len(missed)} of {len(ROWS)} found in their lines')
+        return
     with tempfile.TemporaryDirectory() as folder:
         score = measure(Path(folder), arguments.seed, arguments.systems, arguments.errors)
     for kind, planted in sorted(score.planted.items()):

@@ -43,6 +43,8 @@ def test_nodes_are_driven_in_order_and_again_after_a_restart(compose, peer, wait
     )
     child = compose(text, CODE)
     child.wait_for_line("process 'camera': node '/camera' is inactive")
+    # What a process prints comes another way.
+    child.wait_for_line('[camera] on_configure')
     assert child.output.index("node '/lidar' is active") < child.output.index(
         '[camera] on_configure'
     )
