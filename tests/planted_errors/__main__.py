@@ -4,8 +4,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from tests.planted_errors.behaviours import ROWS, measure_behaviours
 from tests.planted_errors.measurement import measure
+from tests.planted_errors.planted_robots import ROWS, measure_behaviours
 
 
 def main():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.planted_errors.behaviours import ROWS, measure_behaviours
+from tests.planted_errors.planted_robots import ROWS, measure_behaviours
 
 pytestmark = [pytest.mark.ros, pytest.mark.long]
 
