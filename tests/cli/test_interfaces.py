@@ -324,4 +324,6 @@ def test_a_wrong_interfaces_block_is_not_no_interfaces(run):
     Path('system.yaml').write_text('version: 1\ninterfaces: {my_defs: 3}\nnodes: {}\n')
     code, out, err = run('interfaces', 'build', 'system.yaml')
     assert (code, out) == (1, '')
-    assert err.startswith('system.yaml:2:23: error[wrong-type]: expected a string, got 3\n')
+    assert err.startswith(
+        'system.yaml:2:23: error[wrong-type]: expected a string or a mapping, got 3\n'
+    )

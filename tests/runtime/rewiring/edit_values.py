@@ -348,6 +348,8 @@ _OF_HOSTS = (
 _WITH_HOST = ('node', 'process', 'container', 'include', 'worker')
 _ELSEWHERE = 'where all runs on one computer, it changes nothing that runs'
 LEFT_OUT: dict[str, str] = {
+    'interface_package.folder': 'a change of a package needs a restart',
+    'interface_package.only': 'a change of a package needs a restart',
     **{
         f'{kind}.{key}': 'what is absent has no health: it has a test of its own'
         for kind in ('publisher', 'subscription')
