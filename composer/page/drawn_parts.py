@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from composer.language.specs import BehaviourSpec
 
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
+# A drawing of more nodes is not tried both ways: it takes seconds.
+_MOST_NODES_TRIED = 150
 # Of a topic with many ends, the lines of the first ones.
 _MOST_ENDS = 6
 _MOST_CODE_LINES = 15
@@ -78,9 +80,10 @@ def describe_drawing(
         DrawingError: Graphviz is missing or failed.
     """
     drawn = arrange_shapes(picture, folded)
+    tried = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
     documents = {
         each: _inlined(svg.render_picture(picture, folded, each))
-        for each in ([direction] if direction else ['LR', 'TB'])
+        for each in ([direction] if direction else tried)
     }
     direction = min(documents, key=lambda each: _shrinkage(documents[each]))
     return {
