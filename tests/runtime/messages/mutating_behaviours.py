@@ -383,12 +383,14 @@ POSES = []
 
 @case(DiagnosticArray)
 def lets_lists_grow(node, go):
-    DIAGNOSTICS.status.append(DiagnosticStatus())
-    DIAGNOSTICS.status[0].values.append(KeyValue(key='key'))
-    return send(node, DIAGNOSTICS)
+    # Nodes run at the same time: one must not change what another has noted and not yet published.
+    diagnostics = DIAGNOSTICS[node.name]
+    diagnostics.status.append(DiagnosticStatus())
+    diagnostics.status[0].values.append(KeyValue(key='key'))
+    return send(node, diagnostics)
 
 
-DIAGNOSTICS = DiagnosticArray()
+DIAGNOSTICS = defaultdict(DiagnosticArray)
 
 
 @case(PoseArray)

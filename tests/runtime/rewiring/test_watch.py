@@ -282,6 +282,7 @@ def test_values_set_live_stay(running, peer, wait_for):
     peer.node.create_subscription(
         Int64, '/count', lambda message: counts.append(message.data), 1000
     )
+    wait_for(lambda: counts, 'the first count')
     running.edit('{step: 1}', '{step: 10}')
     running.reloaded()
     wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == 10, 'steps of 10')
