@@ -12,12 +12,30 @@ from composer.application.system_reader import list_files
 from composer.drawing.json_document import describe_finding
 from composer.errors import ComposerError
 from composer.planning.text import render_plan
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 _MOST_LINES = 200
+
+
+@record
+class RunningFiles:
+    """What a system runs from.
+
+    Attributes:
+        running: What it answers about itself.
+        paths: Its file and layers.
+        words: Its arguments.
+        set_values: Values that were set.
+    """
+
+    running: str
+    paths: Sequence[Path]
+    words: Sequence[str]
+    set_values: Sequence[str]
 
 
 class SavedFiles:
@@ -30,29 +48,16 @@ class SavedFiles:
 
     def __init__(self) -> None:
         self.next_plan: dict[str, Any] | None = None
-        self._given: tuple[str, Sequence[Path], Sequence[str], Sequence[str]] | None = None
+        self._given: RunningFiles | None = None
         self._files: list[Path] = []
         self._times: dict[Path, int] = {}
         self._thread: threading.Thread | None = None
 
-    def follow(
-        self,
-        running: str,
-        paths: Sequence[Path],
-        words: Sequence[str],
-        set_values: Sequence[str],
-    ) -> None:
-        """Compare with this from now on.
-
-        Args:
-            running: What the system answers about itself.
-            paths: Its file and layers.
-            words: Its arguments.
-            set_values: Values that were set.
-        """
-        self._given = running, paths, words, set_values
+    def follow(self, given: RunningFiles) -> None:
+        """Compare with this from now on."""
+        self._given = given
         self.next_plan, self._times = None, {}
-        self._files = list(paths)
+        self._files = list(given.paths)
 
     def look(self) -> None:
         """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
@@ -63,31 +68,28 @@ class SavedFiles:
             self._times = times
             name = 'composer-next-plan'
             self._thread = threading.Thread(
-                target=self._plan, args=self._given, name=name, daemon=True
+                target=self._plan, args=(self._given,), name=name, daemon=True
             )
             self._thread.start()
 
-    def _plan(
-        self,
-        running: str,
-        paths: Sequence[Path],
-        words: Sequence[str],
-        set_values: Sequence[str],
-    ) -> None:
+    def _plan(self, given: RunningFiles) -> None:
         lines: list[str] = []
         findings: list[Any] = []
-        files, begun_ns = list(paths), time_ns()
+        files, begun_ns = list(given.paths), time_ns()
         try:
-            plan, found, context = plan_from(running, paths, words, set_values)
+            plan, found, context = plan_from(
+                given.running, given.paths, given.words, given.set_values
+            )
             if context is not None:
                 files = sorted(list_files(context))
             if plan is None:
                 findings = [describe_finding(each) for each in found]
             elif plan.operations:
                 lines = render_plan(plan).splitlines()[:_MOST_LINES]
-        except ComposerError as error:
+        except (ComposerError, OSError) as error:
+            # A file may go while it is read.
             lines = [str(error)]
-        if self._given and self._given[0] == running:
+        if self._given is given:
             # One that was saved meanwhile is looked at again.
             more = {each: _time_of(each) for each in files if each not in self._times}
             self._times |= {each: found for each, found in more.items() if found < begun_ns}

@@ -87,7 +87,6 @@ class PageServer:
         self._uvicorn = uvicorn
         self._source = source
         self._secret = secrets.token_urlsafe(32)
-        self._allows_changes = allows_changes
         self._settings = {'allows_changes': allows_changes, 'editor': editor}
         self._streams = 0
         self._wakers: set[asyncio.Event] = set()
@@ -193,7 +192,7 @@ class PageServer:
             return 'another page may not read this one'
         if request.method != 'GET':
             # Browsers name the origin of each request that may change something.
-            if request.method != 'POST' or not (self._allows_changes and origin):
+            if request.method != 'POST' or not (self._settings['allows_changes'] and origin):
                 return "this page only shows: 'composer page --allow-changes' lets it change"
             if request.headers.get('content-type') != 'application/json':
                 return 'a wish is JSON'

@@ -22,7 +22,7 @@ from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.page.drawn_parts import describe_drawing, list_code
 from composer.page.problems import list_problems
-from composer.page.saved_files import SavedFiles
+from composer.page.saved_files import RunningFiles, SavedFiles
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ class WatchedSystem:
             given = answer_forms.read_answer(text, answer_forms.SNAPSHOT)['given']
             file = Path((system.status or {}).get('file', ''))
             paths = [file, *(Path(each) for each in given['layers'])]
-            self._saved.follow(text, paths, given['words'], given['set_values'])
+            self._saved.follow(RunningFiles(text, paths, given['words'], given['set_values']))
             self.drawing = draw_files(paths, given['words'], given['set_values'])
         except (ComposerError, DrawingError) as error:
             # The page is for the same computer as the files, and shows the rest without.

@@ -6,6 +6,7 @@ import threading
 from collections import defaultdict
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, Any, Final, Literal, Self, TypeAlias
 
@@ -323,8 +324,9 @@ class SimulatedSystem:
     def act_on(self, action: NodeAction, name: str) -> None:
         """Stop, kill, start or restart a node, or all nodes of a worker.
 
-        A killed worker is started again as its `restart` says; a node that was stopped or killed
-        is started again by `start` alone.
+        A killed worker is started again as its `restart` says, with all of its nodes; a node that
+        was stopped or killed is started again by `start` alone. Of a worker, nodes stay as they
+        are to which it has happened before.
 
         Args:
             name: That of the node as in the file, its full name, or that of the worker.
@@ -339,10 +341,14 @@ class SimulatedSystem:
             raise SimulationError(message)
         worker = spec.workers.get(name)
         with self._threads.entered():
-            for node in nodes:
-                self._change(action, node)
+            self._change_all(action, nodes, is_worker=worker is not None)
             if action == 'kill' and worker is not None:
                 self._follow_kill(worker, nodes)
+
+    def _change_all(self, action: NodeAction, nodes: list[str], *, is_worker: bool) -> None:
+        for node in nodes:
+            if not is_worker or (node in self._running.nodes) == (action != 'start'):
+                self._change(action, node)
 
     def _change(self, action: NodeAction, node: str) -> None:
         run = self._running
@@ -363,10 +369,7 @@ class SimulatedSystem:
                 self._running.request_stop(ExitCode.FAILED)
             return
 
-        def begin_again() -> None:
-            for node in nodes:
-                self._running.begin_node(node)
-
+        begin_again = partial(self._change_all, 'start', nodes, is_worker=True)
         self.at(self.now + worker.restart_delay_sec, begin_again)
 
     def disturb(
