@@ -14,6 +14,8 @@ pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parent.parent
 SUCCEEDED, CANCELED = 4, 5
 WAITING = 'service not available, waiting again...'
+# A server may be seen a moment before it knows the way back: its first answer is lost then.
+ASKING_AGAIN = 'no answer, asking again...'
 
 
 @pytest.fixture(autouse=True)
@@ -99,7 +101,8 @@ def test_add_two_ints_client_waits_for_an_external_server_and_ends(up, peers):
     assert child.wait() == 0
     said = said_by(child, 'minimal_client_async')
     assert said[-1] == 'Result of add_two_ints: for 5 + 10 = 15'
-    assert set(said[:-1]) == {WAITING}
+    assert said[0] == WAITING
+    assert set(said[:-1]) <= {WAITING, ASKING_AGAIN}
 
 
 def test_add_two_ints_client_takes_names_and_negative_numbers(up, peers):
