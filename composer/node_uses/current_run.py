@@ -107,7 +107,7 @@ class Run:
         the help begins with what may have been meant.
         """
         is_typo = (help_text or '').startswith('did you mean')
-        is_doubtful = bool(self.doubts or self.state_doubts) and not is_typo
+        is_doubtful = bool(self.doubts) and not is_typo
         if not (self.guards or self.broad_guards or is_doubtful):
             problem = Problem(rule, message, span_of(module, node), help_text)
             self.reading.problems.append(problem)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from composer.interfaces.message_types import MessageTypes
     from composer.python_source.modules import ModuleSource
 
+# Of types, type checkers know.
+_OF_VALUES = ('field-length', 'field-range')
 _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Mult: operator.mul,
@@ -80,6 +82,18 @@ def find_problems(
         yield from _Payloads(types, module).message(description, value)
 
 
+def find_misfit(
+    types: MessageTypes,
+    description: MessageDescription,
+    field: FieldDescription,
+    value: ast.expr,
+    module: ModuleSource,
+) -> Problem | None:
+    """Return why what is stored in a field is out of its range, or has another length."""
+    problems = _Payloads(types, module).field(description, field, value)
+    return next((each for each in problems if each.rule in _OF_VALUES), None)
+
+
 class _Payloads:
     def __init__(self, types: MessageTypes, module: ModuleSource) -> None:
         self._types = types
@@ -99,7 +113,7 @@ class _Payloads:
                     if isinstance(key, ast.Constant) and isinstance(key.value, str):
                         yield from self._entry(description, key.value, key, item)
             case _ if len(fields) == 1:
-                yield from self._field(description, fields[0], value)
+                yield from self.field(description, fields[0], value)
             case ast.Constant(value=bool() | int() | float() | str()):
                 yield from self._literal(description, value, value)
 
@@ -108,21 +122,22 @@ class _Payloads:
     ) -> Iterator[Problem]:
         field = description.field(name)
         if field is not None:
-            yield from self._field(description, field, value)
+            yield from self.field(description, field, value)
             return
         names = [each.name for each in description.fields]
         error = unknown_field(in_python(description.name), name, names)
         place = span_of(self._module, key, name)
         yield Problem('unknown-field', str(error), place, error.help)
 
-    def _field(
+    def field(
         self, description: MessageDescription, field: FieldDescription, value: ast.expr
     ) -> Iterator[Problem]:
+        """Yield what is wrong with the value of a field."""
         nested = self._types.describe(field.type.nested) if field.type.nested else None
         items = value.elts if isinstance(value, ast.List | ast.Tuple) else []
         if isinstance(value, ast.IfExp):
-            yield from self._field(description, field, value.body)
-            yield from self._field(description, field, value.orelse)
+            yield from self.field(description, field, value.body)
+            yield from self.field(description, field, value.orelse)
         elif nested is not None and field.type.array is None:
             yield from self.message(nested, value)
         elif nested is not None and items:

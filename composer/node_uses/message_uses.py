@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.message_types import in_python
+from composer.node_uses.literals import find_misfit
 from composer.node_uses.reading import Problem
 from composer.python_source.places import span_of
 from composer.spelling import find_nearest, suggest
@@ -63,6 +64,8 @@ def _find_problem(
             field = found.field(name)
             if field is None:
                 return _unknown(types, found, name, use)
+            if use.value is not None and name is use.path[-1]:
+                return find_misfit(types, found, field, use.value, use.module)
             found = field.type
         elif isinstance(found, FieldType) and found.array and name[0] == '[':
             problem = _wrong_index(found, name, use)

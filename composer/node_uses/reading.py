@@ -188,6 +188,7 @@ class MessageUse:
         is_write: Whether it is written to.
         compared: The comparison with a constant that it is a part of.
         is_certain: Whether the file does not decide on it.
+        value: What is stored there.
     """
 
     path: tuple[str, ...]
@@ -197,6 +198,7 @@ class MessageUse:
     compared: ast.Compare | None = None
     is_certain: bool = True
     of_type: str | None = None
+    value: ast.expr | None = None
 
 
 @dataclass(slots=True)

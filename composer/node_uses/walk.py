@@ -27,7 +27,7 @@ from composer.python_source.syntax import list_children
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from composer.node_uses.names import Names
 
@@ -41,6 +41,8 @@ _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _TESTS = frozenset(
     {'callable', 'get_fields_and_field_types', 'getattr', 'hasattr', 'isinstance', 'type'}
 )
+# What decides on a condition, from what changes while the system runs to what never does.
+_RANKS = ('', 'state', 'file', 'fixed')
 _ENDS = (ast.Return, ast.Raise, ast.Break, ast.Continue)
 NODE_ATTRIBUTES = frozenset(
     {
@@ -121,6 +123,7 @@ class Walk:
         self._steps = 0
         self._entered: set[object] = set()
         self._asked: dict[int, set[str]] = {}
+        self._stored: dict[int, ast.expr] = {}
 
     # Functions
 
@@ -328,6 +331,7 @@ class Walk:
         elif isinstance(known, Chain):
             self._note_read(known, value, scope)
         for target in targets:
+            self._stored[id(target)] = value
             self.visit(target, scope)
         match targets, value:
             case [ast.Name(id=name)], ast.Call(func=func) if self._is_coroutine(func, scope):
@@ -396,28 +400,55 @@ class Walk:
 
     def _chosen_by(self, tests: Sequence[ast.expr], scope: Scope) -> str:
         """Return what decides on a condition: `fixed`, `file`, `state`, or something else."""
-        found: set[str] = set()
-        pending: list[ast.AST] = [*tests]
-        seen: set[str] = set()
-        while pending:
-            node = pending.pop()
-            if isinstance(node, ast.Attribute | ast.Name):
-                match self._names.value_of(node, scope):
-                    case Chain(path=('node', 'name', *_)):
-                        found.add('fixed')
-                    case Chain(path=('node', 'parameters', *_)) | Texts():
-                        found.add('file')
-                    case Chain(path=('node', 'state' | 'own_state', *_)):
-                        found.add('state')
-            found.add('fixed' if _asks_what_it_is(node) else '')
-            if isinstance(node, ast.Name) and node.id not in seen:
-                seen.add(node.id)
-                found.add('file' if self._is_given(node.id, scope) else '')
-                found.add('fixed' if self._is_constant(node.id, scope) else '')
-                pending += self._assigned(node.id, scope)
-            if not isinstance(node, ast.Lambda):
-                pending += list_children(node)
-        return next((each for each in ('fixed', 'file', 'state') if each in found), '')
+        return self._strongest(tests, scope, set()) or ''
+
+    def _strongest(self, nodes: Iterable[ast.AST], scope: Scope, seen: set[str]) -> str | None:
+        """Return what decides on parts of which each may decide alone; `None` for constants."""
+        found = [self._decided_by(each, scope, seen) for each in nodes]
+        return max((each for each in found if each is not None), key=_RANKS.index, default=None)
+
+    def _decided_by(self, node: ast.AST, scope: Scope, seen: set[str]) -> str | None:
+        if self._asks_what_it_is(node, scope):
+            return 'fixed'
+        if isinstance(node, ast.Attribute | ast.Name):
+            match self._names.value_of(node, scope):
+                case Chain(path=('node', 'name', *_)):
+                    return 'fixed'
+                case Chain(path=('node', 'parameters', *_)) | Texts():
+                    return 'file'
+                case Chain(path=('node', 'state' | 'own_state', *_)):
+                    return 'state'
+        match node:
+            case ast.Constant() | ast.Lambda():
+                return None
+            case ast.Name(id=name):
+                if name in seen:
+                    return ''
+                if self._is_given(name, scope) or self._is_constant(name, scope):
+                    return 'file' if self._is_given(name, scope) else 'fixed'
+                return self._strongest(self._assigned(name, scope), scope, seen | {name}) or ''
+            case ast.Compare() | ast.BinOp() | ast.Call():
+                # A value of the run beside one of the file: both outcomes may come.
+                operands = _operands(node)
+                if any(self._asks_what_it_is(each, scope) for each in operands):
+                    return 'fixed'
+                found = [self._decided_by(each, scope, seen) for each in operands]
+                known = (each for each in found if each is not None)
+                return min(known, key=_RANKS.index, default=None)
+        return self._strongest(list_children(node), scope, seen)
+
+    def _asks_what_it_is(self, node: ast.AST, scope: Scope) -> bool:
+        """Return whether a part of a test asks for a type, an attribute, or an identity."""
+        match node:
+            case ast.Compare(ops=[ast.Is() | ast.IsNot()], comparators=[other]):
+                is_member = isinstance(other, ast.Attribute) and other.attr.isupper()
+                return not (isinstance(other, ast.Constant) or is_member)
+            case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=args):
+                of = self._names.value_of(args[0], scope) if args else None
+                return name in _TESTS and of != Chain(('node', 'state'))
+            case ast.Attribute(attr=name):
+                return name.startswith('__')
+        return False
 
     def _is_given(self, name: str, scope: Scope) -> bool:
         """Return whether a name is an argument of which nothing is known, or a constant."""
@@ -694,7 +725,8 @@ class Walk:
         is_patched = bool(self._names.top(scope.module).patched & {*path})
         is_guarded = run.guards or run.broad_guards or run.fixed or is_patched
         if path and (is_write or not is_guarded):
-            use = MessageUse(path, node, scope.module, is_write, compared, not run.doubts, of_type)
+            value, certain = self._stored.get(id(node)), not run.doubts
+            use = MessageUse(path, node, scope.module, is_write, compared, certain, of_type, value)
             run.reading.message_uses.append(use)
         for inner in ast.walk(node):
             if isinstance(inner, ast.Subscript):
@@ -884,16 +916,14 @@ class Walk:
         return True
 
 
-def _asks_what_it_is(node: ast.AST) -> bool:
-    """Return whether a part of a test asks for a type, an attribute, or an identity."""
+def _operands(node: ast.Compare | ast.BinOp | ast.Call) -> list[ast.expr]:
     match node:
-        case ast.Compare(ops=[ast.Is() | ast.IsNot()], comparators=[other]):
-            return not isinstance(other, ast.Constant)
-        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-            return name in _TESTS
-        case ast.Attribute(attr=name):
-            return name.startswith('__')
-    return False
+        case ast.Compare(left=left, comparators=others):
+            return [left, *others]
+        case ast.BinOp(left=left, right=right):
+            return [left, right]
+    owner = [node.func.value] if isinstance(node.func, ast.Attribute) else []
+    return [*owner, *node.args, *(each.value for each in node.keywords)]
 
 
 def _prefix(node: ast.expr, name: str) -> ast.expr:

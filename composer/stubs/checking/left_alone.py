@@ -6,6 +6,7 @@ An error there may be caught, asked for before, or never come, as a value of the
 from __future__ import annotations
 
 import ast
+import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -99,8 +100,7 @@ class LeftAlone:
         function = self.function(report)
         names = {node.id for node in self._expression(chain) if isinstance(node, ast.Name)}
         asked = self._asked_in(function) if function else frozenset()
-        branches = (node for node in chain[1:] if isinstance(node, _BRANCHES))
-        return bool(names & asked) or any(_depends_on_file(branch) for branch in branches)
+        return bool(names & asked) or any(map(_depends_on_file, _branches(chain)))
 
     def depends_on_file(self, report: TypeReport) -> bool:
         """Return whether a report comes after a branch that ends its function as the file says.
@@ -111,12 +111,14 @@ class LeftAlone:
         if function is None:
             return True
         extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
-        inside = {id(node) for node in self.around(report)}
+        chain = self.around(report)
+        tests = {id(node) for node in chain} - {id(node) for node in _branches(chain)}
+        inside = {id(node) for node in _branches(chain)}
         return any(
             isinstance(node, _BRANCHES)
             and self.start(node)[0] <= report.line
             and (_depends_on_file(node) or extra & {*_names(*_test(node))})
-            and (id(node) in inside or _may_end(node))
+            and (id(node) in inside or (id(node) not in tests and _may_end(node)))
             for node in ast.walk(function)
         )
 
@@ -192,12 +194,32 @@ class LeftAlone:
         )
 
 
+def _branches(chain: list[ast.AST]) -> Iterator[ast.AST]:
+    """Yield the branches that decide whether the innermost node of a chain is reached."""
+    for inner, node in itertools.pairwise(chain):
+        is_first = inner in (getattr(node, 'test', None), getattr(node, 'subject', None))
+        is_first |= isinstance(node, ast.BoolOp) and inner is node.values[0]
+        if isinstance(node, _BRANCHES) and not is_first:
+            yield node
+
+
 def _depends_on_file(branch: ast.AST) -> bool:
-    return any(
-        isinstance(node, ast.Attribute) and node.attr in _OF_FILE
-        for test in _test(branch)
-        for node in ast.walk(test)
-    )
+    return any(map(_is_of_file, _test(branch)))
+
+
+def _is_of_file(test: ast.AST) -> bool:
+    """Return whether the file alone may decide on a condition, or on a part of one."""
+    if isinstance(test, ast.Attribute) and test.attr in _OF_FILE:
+        return True
+    children = [each for each in ast.iter_child_nodes(test) if not isinstance(each, ast.Constant)]
+    if isinstance(test, ast.Call) and isinstance(test.func, ast.Name):
+        children.remove(test.func)
+    # A value of the run beside one of the file: both outcomes may come.
+    is_joined = isinstance(test, ast.Compare | ast.BinOp | ast.Call)
+    operands = [each for each in children if isinstance(each, ast.expr | ast.keyword)]
+    if is_joined:
+        return bool(operands) and all(map(_is_of_file, operands))
+    return any(map(_is_of_file, children))
 
 
 def _may_end(branch: ast.AST) -> bool:
@@ -239,7 +261,9 @@ def _guarded_nodes(node: ast.AST) -> Iterator[ast.AST]:
 def _is_fixed(test: ast.expr) -> bool:
     """Return whether a condition may hold always or never: a constant, or an identity."""
     if isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is | ast.IsNot):
-        return not isinstance(test.comparators[0], ast.Constant)
+        other = test.comparators[0]
+        is_member = isinstance(other, ast.Attribute) and other.attr.isupper()
+        return not (isinstance(other, ast.Constant) or is_member)
     if isinstance(test, ast.Constant):
         return True
     return isinstance(test, ast.Name) and (test.id.isupper() or test.id == '__debug__')

@@ -115,6 +115,7 @@ class TypeFindings:
             'missing-attribute': self._attribute,
             'no-matching-overload': self._argument,
             'not-async': self._await,
+            'not-callable': self._called,
             'not-iterable': self._iteration,
             'unexpected-keyword': self._keyword,
             'unsupported-operation': self._operation,
@@ -531,6 +532,16 @@ class TypeFindings:
             return None
         message = 'what is awaited here is no coroutine'
         return values[0], 'missing-await', message, 'leave out the await'
+
+    def _called(self, places: LeftAlone, report: TypeReport) -> _Problem | None:
+        """Return an attribute of the node that is no method."""
+        for node in places.at(report):
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name(), attr=name) as func):
+                    owner = re.search(r'got `(\w+)`', report.message)
+                    if owner and owner[1] in _PARTS.keys() - self.own:
+                        return func, 'bad-call', f"'{name}' is {_PARTS[owner[1]]}: no method", None
+        return None
 
     def _unused(self, places: LeftAlone, report: TypeReport) -> _Problem | None:
         for node in places.at(report):
