@@ -20,16 +20,14 @@ PAGE = ROOT / 'docs' / 'from_launch.md'
 # Stands in for programs of ROS packages that are not installed.
 PROGRAM = f"""#!{sys.executable}
 import signal
-# What interrupts the imports ends the program, too: as an exception it may be lost in them.
+# SIGINT ends the program wherever it is: imports may lose an exception, and rclpy.init() loses what
+# comes after its handlers are there, and before the context is.
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 import rclpy
-rclpy.init()
+rclpy.init(signal_handler_options=rclpy.SignalHandlerOptions.NO)
 node = __import__('rclpy.lifecycle').lifecycle.LifecycleNode('program')
 publisher = node.create_publisher(__import__('std_msgs.msg').msg.String, 'chatter', 10)
-try:
-    rclpy.spin(node)
-except BaseException:
-    pass
+rclpy.spin(node)
 """
 EXECUTABLES = {
     'demo_nodes_cpp': 'talker',
