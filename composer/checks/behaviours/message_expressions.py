@@ -1,27 +1,46 @@
 """Check expressions over the fields of a message, without the message.
 
-Errors that no message can avoid are reported: bad syntax, unknown names, filters and tests,
-unknown fields, and operands of the wrong type.
+Errors that no message can avoid are reported: bad syntax, unknown names, filters and tests, and
+unknown fields. What operators, filters and functions make of values is not looked at.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jinja2 import TemplateError, nodes
 
-from composer.checks.behaviours.sample_values import (
-    ExpressionFinding,
-    SampleEvaluator,
-    SampleMessage,
-)
 from composer.expressions.sandbox import Sandbox, too_deep
 from composer.expressions.templates import describe_syntax
 from composer.interfaces.descriptions import FieldType, MessageDescription
+from composer.interfaces.field_errors import unknown_field
+from composer.interfaces.message_types import MessageTypes
 from composer.records import record
+from composer.spelling import did_you_mean, find_nearest, suggest
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from composer.interfaces.catalogue import InterfaceCatalogue
+
+# These accept undefined names.
+_FOR_UNDEFINED = ('d', 'default', 'defined', 'undefined')
+# These have methods.
+_TEXTS = ('string', 'wstring', 'byte')
+
+
+@record
+class ExpressionFinding:
+    """One error in an expression.
+
+    Attributes:
+        part: The text in it that has the error; empty for all of it.
+    """
+
+    rule: str
+    message: str
+    part: str = ''
+    help: str | None = None
 
 
 @record
@@ -29,54 +48,114 @@ class ExpressionValue:
     """What is known of the value of an expression.
 
     Attributes:
-        sample: A value of its type, or the value of a constant.
-        noun: The type in words.
-        is_constant: Whether the value is always the sample.
-        message: The type of the message that it is, if it is one.
+        type: The type of the field that it is; `None` for a constant.
+        constant: The value that it always has.
     """
 
-    sample: object
-    noun: str
-    is_constant: bool = False
-    message: str | None = None
+    type: FieldType | None
+    constant: object = None
 
 
 def evaluate_over(
-    code: str, heard: MessageDescription, catalogue: InterfaceCatalogue
+    code: str,
+    heard: MessageDescription,
+    catalogue: InterfaceCatalogue,
+    name: str | None = None,
 ) -> tuple[list[ExpressionFinding], ExpressionValue | None]:
     """Return the errors in an expression, and what is known of its value.
 
     Args:
-        heard: The message; in scope are its fields, and the message as `message`.
+        heard: The message.
         catalogue: Describes nested messages; those that it does not know are not checked.
+        name: What the message is called. Without it, its fields are in scope as well as `message`.
     """
     sandbox = Sandbox()
     try:
         expression = sandbox.parse_expression(code)
     except TemplateError as error:
         return [ExpressionFinding('bad-expression', describe_syntax(error))], None
-    types = {'message': FieldType('message', heard.name)}
-    types |= {field.name: field.type for field in heard.fields}
-    evaluator = SampleEvaluator(sandbox, types, catalogue)
+    types = {name or 'message': FieldType('message', heard.name)}
+    types |= {} if name else {field.name: field.type for field in heard.fields}
+    reader = _Reader(sandbox, types, heard, catalogue)
     try:
-        value = evaluator.value(expression)
+        found = reader.type_of(expression)
     except RecursionError:
         return [ExpressionFinding('bad-expression', str(too_deep().message))], None
     if isinstance(expression, nodes.Const):
-        known = ExpressionValue(value, repr(value), is_constant=True)
-    elif isinstance(value, SampleMessage):
-        name = evaluator.noun_of(expression)
-        known = ExpressionValue(None, name, message=name)
-    else:
-        # A whole number would fit an integer.
-        sample = 0.5 if isinstance(value, float) else value
-        known = ExpressionValue(sample, evaluator.noun_of(expression))
-    return evaluator.findings, None if _has_gaps(value) else known
+        return reader.findings, ExpressionValue(None, expression.value)
+    return reader.findings, ExpressionValue(found) if found else None
 
 
-def _has_gaps(value: Any) -> bool:
-    """Return whether a value cannot be compared with the type of a field."""
-    if isinstance(value, list | tuple | dict):
-        items = value.values() if isinstance(value, dict) else value
-        return any(isinstance(each, SampleMessage) or _has_gaps(each) for each in items)
-    return not isinstance(value, str | int | float | bytes | SampleMessage | None)
+class _Reader:
+    """Finds the fields that an expression names, and what is wrong with them."""
+
+    def __init__(
+        self,
+        sandbox: Sandbox,
+        types: Mapping[str, FieldType],
+        heard: MessageDescription,
+        catalogue: InterfaceCatalogue,
+    ) -> None:
+        self.findings: list[ExpressionFinding] = []
+        self._sandbox = sandbox
+        self._types = types
+        self._heard = heard
+        self._messages = MessageTypes(catalogue)
+        self._guarded: set[int] = set()
+
+    def type_of(self, node: nodes.Node) -> FieldType | None:
+        """Return the type of the field that a part is, or `None`; look at all that is in it."""
+        if isinstance(node, nodes.Filter | nodes.Test):
+            self._check_exists(node)
+        inner = [self.type_of(each) for each in node.iter_child_nodes()]
+        match node:
+            case nodes.Name():
+                return self._find_name(node)
+            case nodes.Getattr() if inner[0] and not inner[0].array:
+                return self._find_field(node, inner[0])
+            case nodes.Getitem(arg=nodes.Const(value=int())) if inner[0] and inner[0].array:
+                return inner[0].item
+        return None
+
+    def _check_exists(self, node: nodes.Filter | nodes.Test) -> None:
+        is_filter = isinstance(node, nodes.Filter)
+        what = 'filter' if is_filter else 'test'
+        known = self._sandbox.filters if is_filter else self._sandbox.tests
+        if node.name in _FOR_UNDEFINED:
+            self._guarded.add(id(node.node))
+        if node.name not in known:
+            text, advice = (
+                f"there is no {what} '{node.name}'",
+                suggest(node.name, known, 'there are'),
+            )
+            self.findings.append(ExpressionFinding('bad-expression', text, node.name, advice))
+
+    def _find_name(self, node: nodes.Name) -> FieldType | None:
+        name = node.name
+        is_known = name in self._types or name in self._sandbox.globals
+        if not is_known and id(node) not in self._guarded:
+            text, advice = f"'{name}' is not defined", suggest(name, self._types, 'in scope are')
+            self.findings.append(ExpressionFinding('undefined-name', text, name, advice))
+        return self._types.get(name)
+
+    def _find_field(self, node: nodes.Getattr, owner: FieldType) -> FieldType | None:
+        if owner.nested is None:
+            if owner.kind not in _TEXTS and id(node) not in self._guarded:
+                text = f"{owner} has no field '{node.attr}'"
+                self.findings.append(ExpressionFinding('unknown-field', text, node.attr))
+            return None
+        of_heard = owner.nested == self._heard.name
+        description = self._heard if of_heard else self._messages.describe(owner.nested)
+        field = description.field(node.attr) if description else None
+        if description is None or field is not None or id(node) in self._guarded:
+            return field.type if field else None
+        is_constant = node.attr.isupper()
+        if is_constant and self._messages.may_have_constant(description.name, node.attr):
+            return None
+        fields = [field.name for field in description.fields]
+        error = unknown_field(description.name, node.attr, fields)
+        known = {*fields, *self._messages.constants(description.name)}
+        near = find_nearest(node.attr, known) if is_constant else None
+        advice = did_you_mean(near, error.help)
+        self.findings.append(ExpressionFinding('unknown-field', str(error), node.attr, advice))
+        return None

@@ -119,24 +119,32 @@ def _check_type(
     field = owner.field(last) if owner else None
     if owner is None or field is None:
         return
-    wrong = f'{owner.name}: {last}: expected {field.type}, got {value.noun}'
-    if value.message is not None:
-        if not _may_take(context, field.type, value.message):
-            yield context.at_value(path, 'field-type', wrong)
-        return
-    for finding in check_payload(owner, {last: value.sample}, context.catalogue):
-        if value.is_constant:
+    if value.type is None:
+        for finding in check_payload(owner, {last: value.constant}, context.catalogue):
             yield context.at_value(path, finding.rule, finding.message)
-        elif finding.rule == 'field-type':
-            # How long a list is, nobody knows.
-            yield context.at_value(path, finding.rule, wrong)
-            return
+    elif not _may_take(context, field.type, value.type):
+        wrong = f'{owner.name}: {last}: expected {field.type}, got {value.type}'
+        yield context.at_value(path, 'field-type', wrong)
 
 
-def _may_take(context: CheckContext, wanted: FieldType, message: str) -> bool:
-    """Return whether a field may take a message."""
-    if wanted.nested is None or wanted.array is not None:
-        return False
+def _may_take(context: CheckContext, wanted: FieldType, given: FieldType) -> bool:
+    """Return whether a field may take what another one holds."""
+    if wanted.array or given.array:
+        # How long a list is, nobody knows.
+        return bool(wanted.array and given.array) or bool(wanted.nested)
+    if wanted.nested is None:
+        return given.nested is None and _family(wanted) >= _family(given)
     description = _describe(context, wanted.nested)
     # One with a single field takes what this takes.
-    return wanted.nested == message or description is None or len(description.fields) == 1
+    return wanted.nested == given.nested or description is None or len(description.fields) == 1
+
+
+def _family(field_type: FieldType) -> set[str]:
+    """Return the kinds of values that a field of a plain type takes."""
+    if field_type.kind in ('string', 'wstring'):
+        return {'text'}
+    if field_type.kind == 'bool':
+        return {'bool'}
+    if field_type.kind == 'byte':
+        return {'octet', 'whole'}
+    return {'whole', 'part'} if field_type.kind.startswith('float') else {'whole'}

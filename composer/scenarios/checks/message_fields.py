@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, cast
 from composer.expressions.templates import describe_syntax
 from composer.interfaces.descriptions import (
     ActionDescription,
-    FieldType,
     MessageDescription,
     ServiceDescription,
 )
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
     from composer.diagnostics import Diagnostic
     from composer.entity_kinds import ChannelKind
-    from composer.interfaces.catalogue import InterfaceCatalogue
-    from composer.interfaces.descriptions import InterfaceDescription
     from composer.scenarios.checks.scenario_context import ScenarioContext
     from composer.yaml_text.positions import DataPath
 
@@ -101,38 +98,19 @@ def _check_text(
     # The import of jinja2 takes a tenth of the time of a check.
     from jinja2 import TemplateError
 
-    from composer.checks.behaviours.sample_values import SampleEvaluator
+    from composer.checks.behaviours.message_expressions import evaluate_over
     from composer.expressions.sandbox import Sandbox
     from composer.expressions.scanner import code_of, find_expressions
 
-    sandbox = Sandbox()
-    catalogue = cast('InterfaceCatalogue', _WithPart(context.catalogue, heard))
     try:
-        for expression in find_expressions(text, sandbox):
+        for expression in find_expressions(text, Sandbox()):
             code = code_of(text, expression)
-            types = {name: FieldType('message', heard.name)}
-            evaluator = SampleEvaluator(sandbox, types, catalogue)
-            evaluator.value(sandbox.parse_expression(code))
-            for each in evaluator.findings:
+            for each in evaluate_over(code, heard, context.catalogue, name)[0]:
                 yield context.at_value(
                     path, each.rule, each.message, part=each.part, help=each.help
                 )
     except TemplateError as error:
         yield context.at_value(path, 'bad-expression', describe_syntax(error))
-
-
-class _WithPart:
-    """A catalogue that knows a part of a service or action as well."""
-
-    def __init__(self, catalogue: InterfaceCatalogue, part: MessageDescription) -> None:
-        self._catalogue = catalogue
-        self._part = part
-
-    def describe(self, name: str) -> InterfaceDescription | None:
-        return self._part if name == self._part.name else self._catalogue.describe(name)
-
-    def constant_names(self, name: str) -> frozenset[str] | None:
-        return None if name == self._part.name else self._catalogue.constant_names(name)
 
 
 def check_condition(
@@ -152,7 +130,7 @@ def check_condition(
     # Of a message that is not known, the form of the expression can still be wrong.
     heard = description or MessageDescription('unknown', ())
     findings, value = evaluate_over(code, heard, context.catalogue)
-    if value is not None and value.is_constant:
+    if value is not None and value.type is None:
         message = 'this is the same for every message'
         yield context.at_value(path, 'nothing-expected', message, help='name a field')
     for each in findings:
