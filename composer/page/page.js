@@ -20,7 +20,8 @@ let findings = [];
 let code = {};
 let folder = '';
 let state = {};
-let heard = 0;
+// How far the clock of the browser is ahead of the page's, in seconds.
+let ahead = 0;
 let drawn = 0;
 const tokens = new Map();
 const rates = new Map();
@@ -284,6 +285,7 @@ function makeSelectable(token, part) {
   const element = document.getElementById(token);
   if (!element) return;
   element.classList.add('known');
+  if (part.kind === 'node') element.dataset.id = part.id;
   if (part.members) {
     element.querySelector('text').prepend(part.folded ? '▸ ' : '▾ ');
     element.setAttribute('aria-expanded', String(!part.folded));
@@ -435,6 +437,7 @@ async function draw(selected = parts.get(chosen)?.id ?? restore()) {
   if (parts.size) choose(tokens.get(selected), false);
   if (hasFocus) shapeOf(chosen)?.focus();
   mark();
+  stampParts();
 }
 
 // The state.
@@ -455,6 +458,51 @@ function levelsOfNodes() {
     if (lifecycle !== 'active') levels.set(node, worse('warn', levels.get(node) ?? 'ok'));
   }
   return levels;
+}
+
+// What is older than two of its periods is shown as old: each element that says when what it
+// shows was heard, by the clock of the page, and how often it is.
+function stamp(element, heard, period = 1) {
+  if (heard === undefined) delete element.dataset.heard;
+  else Object.assign(element.dataset, {heard, period: Math.max(period, 0.5)});
+  showAge(element);
+}
+
+function showAge(element) {
+  const {heard, period} = element.dataset;
+  const age = Date.now() / 1000 - ahead - heard;
+  const isOld = age > 2 * period;
+  if (!isOld && !element.classList.contains('old')) return;
+  element.classList.toggle('old', isOld);
+  if (isOld && heard > 0) element.dataset.age = `heard ${age.toFixed(0)} s ago`;
+  else delete element.dataset.age;
+}
+
+function showAges() {
+  for (const element of document.querySelectorAll('[data-heard]')) showAge(element);
+}
+
+// A node, wherever it is shown, and what is drawn of ends and boxes, are as old as their oldest row.
+function stampParts() {
+  const oldest = new Map();
+  for (const row of rows()) {
+    for (const id of [`node:${row.node}`, keyOf(row)]) {
+      oldest.set(id, Math.min(oldest.get(id) ?? Infinity, row.heard));
+    }
+  }
+  // A file that does not run is as new as it gets, and a system that has gone is old.
+  const rest = state.status?.heard ?? (state.problem === undefined ? undefined : 0);
+  const period = state.health?.period_sec;
+  const put = (element, heard) => (heard === undefined
+    ? stamp(element, rest, state.status?.period_sec) : stamp(element, heard, period));
+  for (const element of document.querySelectorAll('[data-id]')) put(element, oldest.get(element.dataset.id));
+  for (const [token, part] of parts) {
+    const element = byId(token);
+    if (!element || element.dataset.id) continue;
+    const near = [...part.near, ...part.members ?? []].map((each) => oldest.get(parts.get(each)?.id))
+      .filter((each) => each !== undefined);
+    put(element, oldest.get(part.id) ?? (near.length ? Math.min(...near) : undefined));
+  }
 }
 
 // Shows the levels in the drawing: classes alone, the layout stays.
@@ -495,6 +543,7 @@ function showItems(list, items) {
       const line = make('span', '', level);
       line.append(make('b', level), ' ', make('span'));
       (item.firstChild ?? item).append(line);
+      if (part) item.dataset.id = part;
       return item;
     }));
   }
@@ -546,6 +595,7 @@ function showTree() {
       const token = tokens.get(`node:${node}`);
       const item = token ? makeLink(token, text) : make('li', text);
       item.classList.add(levels.get(node) ?? 'ok');
+      item.dataset.id = `node:${node}`;
       list.append(item);
     }
     fold.append(list);
@@ -555,6 +605,7 @@ function showTree() {
   }));
 }
 
+const clock = (sec = Date.now() / 1000) => new Date(sec * 1000).toTimeString().slice(0, 8);
 const number = (value, digits = 1) => (typeof value === 'number' ? value.toFixed(digits) : '–');
 
 function sparkline(points) {
@@ -590,6 +641,7 @@ function showLive() {
   table.append(header);
   const isSum = 'gm'.includes(chosen[0]);
   for (const row of isSum ? [sumOf(found), ...found] : found) {
+    const {period_sec: period} = state.health;
     // Names are long: each has a line of its own, above its figures.
     const about = make('tr', '', levelOf(row));
     const line = make('tr');
@@ -606,6 +658,7 @@ function showLive() {
       row.cpu === null ? '–' : number(100 * row.cpu), number(row.queued, 0), number(row.dropped, 0),
       number(row.late, 0), number(row.errors, 0)];
     for (const cell of cells) line.append(make('td', cell));
+    for (const each of [name, line]) stamp(each, row.heard, period);
     table.append(about, line);
   }
   live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now'), table);
@@ -613,7 +666,8 @@ function showLive() {
 
 // Adds up the figures of entities.
 function sumOf(found) {
-  const sum = {kind: 'all', name: found.length, node: ''};
+  const heard = Math.min(...found.map((row) => row.heard));
+  const sum = {kind: 'all', name: found.length, node: '', heard};
   for (const key of ['rate_hz', 'cpu', 'queued', 'dropped', 'late', 'errors']) {
     sum[key] = found.reduce((total, row) => total + (row[key] ?? 0), 0);
   }
@@ -641,7 +695,7 @@ async function askParameters() {
     } else value.append(`${text}  ${about}`);
     list.append(make('dt', each.name), value);
   }
-  section.append(make('h2', 'Parameters'), list);
+  section.append(make('h2', 'Parameters'), make('p', `as of ${clock()}`, 'kind'), list);
 }
 
 // What changes the system, where the page may.
@@ -718,7 +772,7 @@ function showPlans() {
   }));
   byId('reload').hidden = !(state.allows_changes && next && !next.findings.length);
   byId('last').textContent = last
-    ? `Last reload, ${new Date(last.time * 1000).toTimeString().slice(0, 8)}: ${last.message || (last.succeeded ? 'done' : 'failed')}` : '';
+    ? `Last reload, ${clock(last.time)}: ${last.message || (last.succeeded ? 'done' : 'failed')}` : '';
 }
 byId('reload').addEventListener('click', () => act({action: 'reload'}, byId('told')));
 
@@ -732,7 +786,7 @@ function offerMessage() {
   button.type = 'button';
   button.addEventListener('click', async () => {
     const found = await get(`api/message?topic=${encodeURIComponent(part.name)}`);
-    section.replaceChildren(make('h2', 'Message'), button, make('pre', found.text ?? found.problem));
+    section.replaceChildren(make('h2', 'Message'), button, make('p', `as of ${clock()}`, 'kind'), make('pre', found.text ?? found.problem));
   });
   section.append(make('h2', 'Message'), button);
 }
@@ -756,8 +810,7 @@ function showLog() {
   byId('log').replaceChildren(...shown.slice(-MOST_LINES).reverse().map((line) => {
     const level = {warn: 'warn', error: 'error', fatal: 'error'}[line.level] ?? 'ok';
     const item = make('li', '', level);
-    const time = new Date(line.time * 1000).toTimeString().slice(0, 8);
-    item.append(make('span', `${time} ${line.name} `, 'place'), line.text);
+    item.append(make('span', `${clock(line.time)} ${line.name} `, 'place'), line.text);
     return item;
   }));
 }
@@ -765,15 +818,11 @@ function showLog() {
 function showSummary() {
   byId('name').textContent = state.name || 'Composer';
   document.title = `${(state.problems ?? []).length ? '● ' : ''}${state.name || 'Composer'}`;
-  const period = state.health?.period_sec ?? 1;
-  const age = (Date.now() - heard) / 1000;
-  const isOld = state.runs && age > 2 * period + 1;
-  // A file that does not run is as new as it gets.
-  document.body.classList.toggle('old', isOld || (!state.runs && state.problem !== undefined));
   const status = state.status;
+  stamp(byId('summary'), status?.heard, status?.period_sec);
   const cpu = (state.health?.processes ?? []).reduce((sum, each) => sum + (each.cpu ?? 0), 0);
   byId('summary').textContent = status
-    ? `${isOld ? `last heard ${age.toFixed(0)} s ago` : state.runs ? status.state : 'gone'}, `
+    ? `${state.runs ? status.state : 'gone'}, `
       + `${status.nodes.length} nodes, ${(100 * cpu).toFixed(0)} % of a core, ${status.host}, `
       + `process ${status.pid}, ${status.file.slice(status.file.lastIndexOf('/') + 1)}`
     : state.problem || 'a file: nothing runs';
@@ -781,7 +830,7 @@ function showSummary() {
 
 function take(next) {
   state = next;
-  heard = Date.now();
+  ahead = Date.now() / 1000 - state.time;
   for (const row of rows()) {
     const key = keyOf(row);
     rates.set(key, [...(rates.get(key) ?? []), row.rate_hz ?? 0].slice(-MOST_POINTS));
@@ -796,6 +845,7 @@ function take(next) {
   showPlans();
   showTree();
   showLive();
+  stampParts();
   if (state.runs) fetchLog();
 }
 
@@ -804,7 +854,6 @@ window.addEventListener('hashchange', async () => {
   await draw(restore());
   if (chosen !== null) bringIn(shapeOf(chosen));
 });
-setInterval(showSummary, 1000);
+setInterval(showAges, 500);
 const events = new EventSource('api/events');
 events.addEventListener('message', (event) => take(JSON.parse(event.data)));
-events.addEventListener('error', () => { heard = Math.min(heard, Date.now() - 1e4); showSummary(); });

@@ -11,6 +11,7 @@ import socket
 from concurrent.futures import Future
 from contextlib import suppress
 from importlib import resources
+from time import time
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
@@ -227,7 +228,7 @@ class PageServer:
         return _json(self._shown())
 
     def _shown(self) -> dict[str, Any]:
-        return {**self._source.state, **self._settings}
+        return {**self._source.state, **self._settings, 'time': time()}
 
     async def _drawing(self, request: Request) -> Response:
         drawing = self._source.drawing

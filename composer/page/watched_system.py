@@ -136,6 +136,7 @@ class WatchedSystem:
         self._saved = SavedFiles()
         self.changed: Callable[[], object] = lambda: None
         self._lines = 0
+        self._rows: list[dict[str, Any]] = []
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
@@ -181,10 +182,12 @@ class WatchedSystem:
         said: dict[str, Any] = {}
         next_status = 0.0
         while not self._ended.is_set():
-            if monotonic() >= next_status:
-                next_status = monotonic() + _STATUS_PERIOD_SEC
+            begun = monotonic()
+            if begun >= next_status:
+                next_status = begun + _STATUS_PERIOD_SEC
                 before = said
                 said = answer_forms.read_answer(status(STATUS_SEC).text, answer_forms.STATUS)
+                said |= {'heard': time(), 'period_sec': _STATUS_PERIOD_SEC}
                 if before and before['last_reload'] != said['last_reload']:
                     self._draw(client, system)
             self._saved.look()
@@ -193,12 +196,12 @@ class WatchedSystem:
             except ComposerError as error:
                 # As where `diagnostics: false` measures nothing.
                 found = {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
+            self._note_heard(said, found)
             self._tell(
                 {
                     'name': said['name'],
                     'runs': True,
                     'problem': found.get('problem', ''),
-                    'time': time(),
                     'status': said,
                     'health': found,
                     'problems': list_problems(said, found),
@@ -207,7 +210,21 @@ class WatchedSystem:
                     'next': self._saved.next_plan,
                 }
             )
-            self._spin(client, monotonic() + max(_POLL_SEC, found['period_sec'] / 2))
+            # A silent worker takes a second of the pause: the others do not seem old for it.
+            self._spin(client, max(begun + found['period_sec'] / 2, monotonic() + _POLL_SEC))
+
+    def _note_heard(self, said: dict[str, Any], found: dict[str, Any]) -> None:
+        """Add to each entity when it was `heard`; those of a silent worker stay as they were."""
+        now, before = time(), self.state.get('health', {})
+        # What the system itself measured in one period is asked for more than once.
+        is_same = found.get('period') == before.get('period')
+        found['heard'] = before.get('heard', now) if is_same else now
+        for row in found['entities']:
+            row['heard'] = now if row['worker'] else found['heard']
+        silent = {each['name'] for each in said['workers']}
+        silent -= {row['worker'] for row in found['entities']}
+        found['entities'] += [row for row in self._rows if row['worker'] in silent]
+        self._rows = found['entities']
 
     def _draw(self, client: Client, system: RunningSystem) -> None:
         problem = ''

@@ -336,6 +336,47 @@ def find_violations(browser, rest):
     ]
 
 
+def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
+    """Each part by itself: a worker is stopped for a while, and then the whole system."""
+    child = compose(
+        'diagnostics: {period: 0.5}' + SYSTEM.replace('  ear:\n', '  ear:\n    worker: side\n'),
+        CODE.replace("raise ValueError('" + EVIL + "')", 'pass'),
+    )
+    child.wait_until_ready()
+    page = Page(compose.domain_id, 'system')
+    everything = {'node:/ear', 'node:/left/talker', 'edge', 'row'}
+
+    def old():
+        script = """return [...document.querySelectorAll('.old')].map((each) =>
+            each.dataset.id ?? (each.closest('#live') ? 'row' : each.closest('svg') ? 'edge' : each.id))"""
+        return set(browser.execute_script(script)) & everything
+
+    browser.get(page.address)
+    browser.get(f'http://127.0.0.1:{page.port}/#node%3A%2Fear')
+    wait_for(lambda: 'subscription words' in read_text(browser, '#live'), 'figures')
+    wait_for(lambda: not old(), 'fresh figures')
+    rows = page.json('/api/state')['health']['entities']
+    assert {row['worker'] for row in rows if row['node'] == '/ear'} == {'side'}
+    (worker,) = page.json('/api/state')['status']['workers']
+    os.kill(worker['pid'], signal.SIGSTOP)
+    try:
+        wait_for(lambda: old() >= {'node:/ear', 'row'}, 'the old node')
+        assert 'heard' in browser.find_element('css selector', '#tree .old').get_attribute(
+            'data-age'
+        )
+        wait_for(lambda: old() == {'node:/ear', 'row', 'edge'}, 'what is fresh')
+    finally:
+        os.kill(worker['pid'], signal.SIGCONT)
+    wait_for(lambda: not old(), 'fresh figures again')
+    os.kill(child.pid, signal.SIGSTOP)
+    try:
+        wait_for(lambda: old() >= everything, 'an old page')
+    finally:
+        os.kill(child.pid, signal.SIGCONT)
+    assert page.end() == 130
+    assert child.stop() == 0
+
+
 def test_boxes_fold_and_the_address_has_the_view(page, browser):
     from selenium.common import StaleElementReferenceException
     from selenium.webdriver import ActionChains, Keys

@@ -29,6 +29,7 @@ STATUS: Final[Form] = {
     'components': [str],
     'lifecycles': {str: str},
     'external_processes': [_EXTERNAL],
+    'workers': [{'name': str}],
     'health': (NoneType, {'level': str, 'message': str}),
     'last_reload': (NoneType, {'time': float, 'succeeded': bool}),
 }
