@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 ChannelKind: TypeAlias = Literal['topic', 'service', 'action']
 
+# What `goal.status` is, in the order of the numbers of action_msgs/msg/GoalStatus.
+_UNDER_WAY, _ENDED = ('accepted', 'executing', 'canceling'), ('succeeded', 'canceled', 'aborted')
+GOAL_STATUSES = ('unknown', *_UNDER_WAY, *_ENDED)
 # The payload of the publisher that `publish:` names.
 PUBLISHED = 'published'
 # The folder of a channel's types in an interface package.

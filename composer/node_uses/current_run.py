@@ -153,9 +153,9 @@ class Run:
         use = StateUse(name, span_of(module, node, name), is_guarded)
         self.reading.state_read.append(use)
 
-    def set_state(self, name: str, scope: Scope) -> None:
+    def set_state(self, name: str, scope: Scope, node: ast.expr) -> None:
         """Note that a name of `node.state` is set."""
-        self.reading.state_set.add(name)
+        self.reading.state_set.setdefault(name, span_of(scope.module, node, name))
         self.fill(Awaited('', 'state', name), scope)
 
     def fill(self, what: Awaited, scope: Scope) -> None:

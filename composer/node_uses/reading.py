@@ -212,7 +212,7 @@ class Reading:
         reads_others: Whether it may read parameters of other nodes.
         reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
         state_read: What it reads of `node.state`.
-        state_set: The names that it sets there.
+        state_set: The names that it sets there, and where.
         is_state_open: Whether it may set others.
         state_tested: The names that it asks for with `hasattr`.
         own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
@@ -237,7 +237,7 @@ class Reading:
     reads_others: bool = False
     reaches_ros: bool = False
     state_read: list[StateUse] = field(default_factory=list)
-    state_set: set[str] = field(default_factory=set)
+    state_set: dict[str, Span] = field(default_factory=dict)
     is_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
     own_state_read: list[StateUse] = field(default_factory=list)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
+from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
 from composer.node_uses.reading import Awaited, MessageUse, StateUse
@@ -632,6 +633,12 @@ class Walk:
                 if isinstance(left, Chain) and left.path[0] in ('message', 'made'):
                     self._use_message(left, node.left, scope, node)
                     return
+                match left, operands[1]:
+                    case Chain(path=('goal', _, 'status')), ast.Constant(value=value) as other:
+                        if value not in GOAL_STATUSES:
+                            text = f'the status of a goal is never {value!r}'
+                            help_text = suggest(value, GOAL_STATUSES, 'it is one of')
+                            self.run.report('never-equal', scope.module, other, text, help_text)
         for operand in operands:
             self.visit(operand, scope)
 
@@ -647,7 +654,7 @@ class Walk:
         is_stored = not isinstance(node.ctx, ast.Load)
         match chain.path:
             case ('node', 'state', name) if is_stored:
-                self.run.set_state(name, scope)
+                self.run.set_state(name, scope, node)
             case ('node', 'parameters', name) if is_stored:
                 self._refuse_parameter(node, scope, name)
             case ('node', name) if is_stored:
@@ -906,7 +913,7 @@ class Walk:
             case Chain(path=('node', 'state')) if texts is not None:
                 run.reading.state_tested |= set(texts)
                 for text in texts if function.endswith('setattr') else ():
-                    run.set_state(text, scope)
+                    run.set_state(text, scope, call)
             case Chain(path=('node', 'state')):
                 run.reading.is_state_open = True
             case _:

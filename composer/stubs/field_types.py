@@ -41,12 +41,12 @@ class StubImports:
     def message(self, full_name: str) -> str:
         """Return how the stub names the class of an interface, or of a part of one."""
         package, kind, name = full_name.split('/')
-        return self._of(f'{package}.{kind}', name)
+        return self.of(f'{package}.{kind}', name)
 
     def payload(self, full_name: str) -> str:
         """Return how the stub names what may be given for a message."""
         package, _, name = full_name.split('/')
-        return self._of(f'{PAYLOADS}.{package}', name)
+        return self.of(f'{PAYLOADS}.{package}', name)
 
     def support(self, name: str) -> str:
         """Return how the stub names a type that all stubs share."""
@@ -61,7 +61,8 @@ class StubImports:
         """Return the statements that import all this."""
         return sorted(self._lines)
 
-    def _of(self, module: str, name: str) -> str:
+    def of(self, module: str, name: str) -> str:
+        """Return how the stub names a class of a module."""
         if module == self.module:
             return name
         alias = '_' + module.removeprefix(f'{SUPPORT}.').replace('.', '_')

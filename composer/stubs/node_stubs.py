@@ -129,6 +129,8 @@ def _literal(imports: StubImports, names: Iterable[str]) -> str:
 
 def _named(imports: StubImports, of_type: str) -> str:
     """Return a type with the names by which a stub knows those of `typing`."""
+    if ':' in of_type:
+        return imports.of(*of_type.split(':'))
     for name in ('Any', 'Literal', 'Time'):
         if of_type.startswith(name):
             alias = imports.take('rclpy.time' if name == 'Time' else 'typing', name)

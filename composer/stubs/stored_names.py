@@ -17,8 +17,10 @@ _ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
 _NUMBERS = frozenset({'int', 'float'})
 
 
-def find_stored_names(tree: ast.Module) -> dict[str, frozenset[str]] | None:
+def find_stored_names(tree: ast.Module, module: str) -> dict[str, frozenset[str]] | None:
     """Return every name that a module sets as an attribute of anything, with the types of values.
+
+    A class of the module itself is shown as `module:Class`.
 
     It need not be `node.state` itself that it names: that may be passed on, or have another name.
 
@@ -27,7 +29,9 @@ def find_stored_names(tree: ast.Module) -> dict[str, frozenset[str]] | None:
     """
     names: dict[str, set[str]] = {}
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    values = dict(_assigned(tree))
+    classes = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
+    own = {name: f'{module}:{name}' for name in classes}
+    values = dict(_assigned(tree, own))
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
             names.setdefault(node.attr, set()).add(values.get(id(node), _ANYTHING))
@@ -54,11 +58,13 @@ def type_of_state(value: object, stored: Iterable[Mapping[str, frozenset[str]]],
         # A number stays one, with whatever it is added to or multiplied by.
         types = types - {'+='} | ({'float'} if types & _NUMBERS else {_ANYTHING})
     types.discard('NoneType')
+    if len(types) == 1 and ':' in ''.join(types):
+        return types.pop()
     known = types <= {'bool', 'int', 'float', 'str', 'Time'}
     return ' | '.join(sorted(types)) if known and types else _ANYTHING
 
 
-def _assigned(tree: ast.Module) -> Iterator[tuple[int, str]]:
+def _assigned(tree: ast.Module, own: Mapping[str, str]) -> Iterator[tuple[int, str]]:
     """Yield what is assigned to, and the type of its value."""
     # Arrays of NumPy turn what they are added to into an array.
     is_plain = not any(
@@ -69,13 +75,15 @@ def _assigned(tree: ast.Module) -> Iterator[tuple[int, str]]:
     )
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign):
-            yield from ((id(target), _type_of(node.value)) for target in node.targets)
+            yield from ((id(target), _type_of(node.value, own)) for target in node.targets)
         elif isinstance(node, ast.AugAssign) and is_plain and isinstance(node.op, _ARITHMETIC):
             yield id(node.target), '+='
 
 
-def _type_of(value: ast.expr) -> str:
+def _type_of(value: ast.expr, own: Mapping[str, str]) -> str:
     match value:
+        case ast.Call(func=ast.Name(id=name)) if name in own:
+            return own[name]
         case ast.Constant():
             return type(value.value).__name__
         case ast.JoinedStr():

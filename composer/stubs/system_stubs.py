@@ -93,7 +93,7 @@ def module_of(context: CheckContext) -> str:
 
 def shapes_of(context: CheckContext, modules: Mapping[str, ProjectModule]) -> dict[str, NodeShape]:
     """Return the shapes of a system's nodes, by their keys in the file."""
-    stored = {name: find_stored_names(module.tree) for name, module in modules.items()}
+    stored = {name: find_stored_names(module.tree, name) for name, module in modules.items()}
     return {
         node.key: shape_of(
             node, [stored[each] for each in reach_of(node, modules)], _created(context, node)

@@ -222,7 +222,9 @@ def _check_state(
         return
     known = set(node.state).union(*(reading.state_set for _, reading in readings))
     tested = set().union(*(reading.state_tested for _, reading in readings))
+    used = tested.union(*({use.name for use in reading.state_read} for _, reading in readings))
     for binding, reading in readings:
+        yield from _check_stored(context, node, (binding, reading), used)
         for use in reading.state_read:
             if use.name in known or use.name in tested:
                 continue
@@ -233,6 +235,26 @@ def _check_state(
                 'unknown-state',
                 f"neither 'state:' of node '{node.name}' nor a behaviour sets '{use.name}'",
                 help=suggest(use.name, known, 'there are', "declare it under 'state:'"),
+                related=[bound_at(context, binding)],
+            )
+
+
+def _check_stored(
+    context: CheckContext, node: NodeSpec, bound: tuple[Binding, Reading], used: set[str]
+) -> Iterator[Diagnostic]:
+    """Check names of `node.state` that are set for nobody: declared ones may be meant."""
+    binding, reading = bound
+    mentioned = context.behaviours.mentions(reading).attributes
+    for name, place in reading.state_set.items():
+        near = find_nearest(name, node.state)
+        if name in node.state or name in used or near is None or not is_typo(name, near):
+            continue
+        if name not in mentioned:
+            yield diagnostic_at(
+                place,
+                'unknown-state',
+                f"'{name}' is set in the state, and nothing reads it",
+                help=f"did you mean '{near}'?",
                 related=[bound_at(context, binding)],
             )
 

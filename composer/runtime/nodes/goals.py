@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
 
+from composer.entity_kinds import GOAL_STATUSES
 from composer.errors import GoalTimeoutError
 from composer.runtime.tracing.tracer import COROUTINE, tracer
 
@@ -16,15 +17,7 @@ if TYPE_CHECKING:
     from composer.errors import ComposerError
     from composer.runtime.behaviours.waits import Waits
 
-STATUS_NAMES = {
-    GoalStatus.STATUS_UNKNOWN: 'unknown',
-    GoalStatus.STATUS_ACCEPTED: 'accepted',
-    GoalStatus.STATUS_EXECUTING: 'executing',
-    GoalStatus.STATUS_CANCELING: 'canceling',
-    GoalStatus.STATUS_SUCCEEDED: 'succeeded',
-    GoalStatus.STATUS_CANCELED: 'canceled',
-    GoalStatus.STATUS_ABORTED: 'aborted',
-}
+STATUS_NAMES = dict(enumerate(GOAL_STATUSES))
 
 
 class Goal:

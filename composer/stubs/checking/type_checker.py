@@ -48,6 +48,7 @@ incompatible-comparison = true
 missing-argument = true
 missing-attribute = true
 no-matching-overload = true
+not-callable = true
 not-async = true
 not-iterable = true
 read-only = true

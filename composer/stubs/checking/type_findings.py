@@ -14,7 +14,7 @@ from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
 from composer.records import record
-from composer.spelling import suggest
+from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.received_values import changed_names, payload_of
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ class TypeFindings:
         messages: The full names of messages, by their classes; of one that several have, empty.
         own: The names that the project itself defines, or imports from elsewhere.
         modules: The names of its modules.
+        defined: What it gives to classes and objects, by whatever way.
     """
 
     context: CheckContext
@@ -90,6 +91,7 @@ class TypeFindings:
     messages: Mapping[str, str]
     own: frozenset[str]
     modules: frozenset[str]
+    defined: frozenset[str]
 
     def explain_all(
         self, places: LeftAlone, reports: Sequence[TypeReport]
@@ -150,8 +152,8 @@ class TypeFindings:
     # Attributes
 
     def _attribute(self, places: LeftAlone, report: TypeReport) -> _Problem | None:
-        match = _ATTRIBUTE.search(report.message)
-        if match is None or places.is_asked_for(match[2]) or match[1] in self.own:
+        match, meant = _ATTRIBUTE.search(report.message), _MEANT.search(report.message)
+        if match is None or places.is_asked_for(match[2]):
             return None
         owner, name = match.groups()
         found = [
@@ -159,26 +161,44 @@ class TypeFindings:
             for node in places.at(report)
             if isinstance(node, ast.Attribute) and node.attr == name
         ]
-        if not found or not self._is_of_one_type(places, report, found[0].value):
+        if not found or isinstance(found[0].ctx, ast.Del):
             return None
-        node = found[0]
-        if owner == 'Coroutine':
-            message = f"'{name}' is read of a coroutine, which has not been awaited"
-            return node, 'missing-await', message, 'put await before the call'
-        if isinstance(node.ctx, ast.Del):
+        if owner in self.own or not self._is_ours(owner):
+            return self._misspelt(owner, name, found[0], meant[1] if meant else '')
+        if not self._is_of_one_type(places, report, found[0].value):
             return None
         for suffix, rule in (('Parameters', 'unknown-parameter'), ('State', 'unknown-state')):
             if owner.endswith(suffix) and owner.removesuffix(suffix) in self.nodes:
                 if places.depends_on_file(report):
                     return None
-                return self._unknown_name(owner.removesuffix(suffix), rule, name, node)
-        meant = _MEANT.search(report.message)
-        help_text = f"did you mean '{meant[1]}'?" if meant else None
+                return self._unknown_name(owner.removesuffix(suffix), rule, name, found[0])
+        return self._unknown_of_ours(owner, name, found[0], meant[1] if meant else None)
+
+    def _unknown_of_ours(
+        self, owner: str, name: str, node: ast.expr, meant: str | None
+    ) -> _Problem | None:
+        if owner == 'Coroutine':
+            message = f"'{name}' is read of a coroutine, which has not been awaited"
+            return node, 'missing-await', message, 'put await before the call'
         if owner in self.nodes or owner in _PARTS:
             what = _PARTS.get(owner, 'the node')
-            return node, 'unknown-attribute', f"{what} has no attribute '{name}'", help_text
+            message = f"{what} has no attribute '{name}'"
+            return node, 'unknown-attribute', message, did_you_mean(meant)
         full_name = self.messages.get(owner)
         return self._unknown_field(full_name, name, node) if full_name else None
+
+    def _is_ours(self, owner: str) -> bool:
+        """Return whether a class is one of the stubs, or what one of their methods makes."""
+        of_node = owner.removesuffix('Parameters').removesuffix('State')
+        ours = {'Coroutine', *_PARTS, *self.messages, *self.nodes}
+        return owner in ours or of_node in self.nodes
+
+    def _misspelt(self, owner: str, name: str, node: ast.expr, meant: str) -> _Problem | None:
+        """Return an attribute of a class of the project, or of Python, that is certainly wrong."""
+        if name in self.defined or not (meant and is_typo(name, meant)):
+            return None
+        message = f"'{owner}' has no attribute '{name}'"
+        return node, 'unknown-attribute', message, did_you_mean(meant)
 
     def _unknown_name(self, owner: str, rule: str, name: str, node: ast.expr) -> _Problem:
         label = self.nodes[owner][0].name

@@ -74,6 +74,7 @@ def find_type_errors(
         _message_classes(files),
         _own_names(modules) | _changed_classes(modules),
         frozenset(modules),
+        _defined_names(modules),
     )
     every, kept = [], []
     for path, copy in copies.items():
@@ -151,6 +152,20 @@ def _own_names(modules: dict[str, ProjectModule]) -> frozenset[str]:
         if not _OF_ROS.search(full_name)
     )
     return frozenset([*defined, *imported])
+
+
+def _defined_names(modules: dict[str, ProjectModule]) -> frozenset[str]:
+    """Return all names that the code of the modules may give to something."""
+    found: set[str] = set()
+    for node in (each for module in modules.values() for each in ast.walk(module.tree)):
+        match node:
+            case ast.Attribute(attr=name, ctx=ast.Store()) | ast.Name(id=name, ctx=ast.Store()):
+                found.add(name)
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                found.add(name)
+            case ast.ClassDef(name=name) | ast.arg(arg=name) | ast.Constant(value=str(name)):
+                found.add(name)
+    return frozenset(found)
 
 
 def _changed_classes(modules: dict[str, ProjectModule]) -> frozenset[str]:
