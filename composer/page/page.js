@@ -29,9 +29,12 @@ const rates = new Map();
 // The view: a rectangle of the drawing, moved and resized by its viewBox.
 let all = {x: 0, y: 0, width: 1, height: 1};
 let view = {...all};
+// Whether it is that of the whole drawing, as before somebody moves or resizes it.
+let showsAll = true;
 
-function show(next) {
+function show(next, isAll = false) {
   view = next;
+  showsAll = isAll;
   svg.setAttribute('viewBox', `${view.x} ${view.y} ${view.width} ${view.height}`);
 }
 
@@ -50,7 +53,7 @@ function fit() {
   show(shaped({
     x: all.x - margin, y: all.y - margin, width: all.width + 2 * margin,
     height: all.height + 2 * margin,
-  }));
+  }), true);
 }
 
 // Zooms around a point, given in parts of the stage's width and height.
@@ -422,11 +425,10 @@ async function draw(selected = parts.get(chosen)?.id ?? restore()) {
   if (drawing.svg) {
     const made = new DOMParser().parseFromString(drawing.svg, 'image/svg+xml').documentElement;
     const box = made.viewBox.baseVal;
-    const isNew = parts.size > 0 && all.width !== box.width;
     all = {x: box.x, y: box.y, width: box.width, height: box.height};
     svg = document.importNode(made, true);
     stage.replaceChildren(svg);
-    if (isNew) fit(); else show(view);
+    if (showsAll) fit(); else show(view);
   } else {
     stage.replaceChildren(make('p', state.drawing_problem || 'There is no drawing.', 'kind'));
   }
@@ -569,7 +571,7 @@ function showProblems() {
 function showTree() {
   const levels = levelsOfNodes();
   const {nodes: running, lifecycles} = state.status ?? {};
-  const shown = JSON.stringify([drawn, [...levels].sort(), running, lifecycles, parts.size]);
+  const shown = JSON.stringify([drawn, [...levels].sort(), running, lifecycles, parts.size, state.outside]);
   if (byId('tree').dataset.shown === shown) return;
   byId('tree').dataset.shown = shown;
   const drawnNodes = [...parts.values()].filter((part) => part.id.startsWith('node:'))
@@ -602,7 +604,23 @@ function showTree() {
     const item = make('li');
     item.append(fold);
     return item;
-  }));
+  }), ...listOutside());
+}
+
+// The publishers and subscriptions of other programs, each a link to its topic.
+function listOutside(only) {
+  const ends = Object.entries(state.outside ?? {}).filter(([topic]) => (only ?? topic) === topic)
+    .flatMap(([topic, found]) => found.map((end) => [topic, end]));
+  if (!ends.length) return [];
+  const list = make('ul');
+  for (const [topic, end] of ends) {
+    const text = `${end.kind}${only ? '' : ` ${topic}`} of ${end.node}`;
+    const token = tokens.get(`topic:${topic}`);
+    list.append(token && !only ? makeLink(token, text) : make('li', text));
+  }
+  const item = make(only ? 'div' : 'li', '', 'outside');
+  item.append(make(only ? 'h2' : 'b', 'Outside the system'), list);
+  return [item];
 }
 
 const clock = (sec = Date.now() / 1000) => new Date(sec * 1000).toTimeString().slice(0, 8);
@@ -633,7 +651,9 @@ function chosenRows() {
 function showLive() {
   const found = chosenRows();
   const live = byId('live');
-  if (!found.length) { live.replaceChildren(); return; }
+  const part = parts.get(chosen);
+  const outside = part?.kind === 'topic' ? listOutside(part.id.slice(6)) : [];
+  if (!found.length) { live.replaceChildren(...outside); return; }
   const table = make('table');
   const titles = ['Hz', '', 'mean ms', 'p99 ms', 'core %', 'queue', 'drops', 'late', 'errors'];
   const header = make('tr');
@@ -661,7 +681,7 @@ function showLive() {
     for (const each of [name, line]) stamp(each, row.heard, period);
     table.append(about, line);
   }
-  live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now'), table);
+  live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now'), table, ...outside);
 }
 
 // Adds up the figures of entities.
@@ -849,7 +869,7 @@ function take(next) {
   if (state.runs) fetchLog();
 }
 
-window.addEventListener('resize', () => show(shaped(view)));
+window.addEventListener('resize', () => (showsAll ? fit() : show(shaped(view))));
 window.addEventListener('hashchange', async () => {
   await draw(restore());
   if (chosen !== null) bringIn(shapeOf(chosen));

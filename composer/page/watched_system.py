@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from time import monotonic, time
@@ -21,15 +22,16 @@ from composer.drawing.picture import build_picture
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.page.drawn_parts import describe_drawing, list_code
+from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.page.saved_files import RunningFiles, SavedFiles
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from concurrent.futures import Future
 
-    from composer.drawing.picture import Picture
+    from composer.drawing.picture import Picture, Side
 
 _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
@@ -63,15 +65,21 @@ class Drawing:
 
     Attributes:
         shown: See `describe_drawing`; nothing is folded.
+        nodes: The full names of the nodes.
+        topics: Those of the topics.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
     """
 
-    def __init__(self, picture: Picture, code: dict[str, list[dict[str, Any]]]) -> None:
+    def __init__(
+        self, picture: Picture, code: dict[str, list[dict[str, Any]]], direction: str = ''
+    ) -> None:
         self._picture = picture
         self._code = code
-        self.shown = describe_drawing(picture, code)
+        self.shown = describe_drawing(picture, code, direction=direction)
+        self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
+        self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
         self._lock = threading.Lock()
         self._folded: dict[frozenset[str], dict[str, Any]] = {}
 
@@ -88,6 +96,28 @@ class Drawing:
                     self._picture, self._code, folded, self.shown['direction']
                 )
             return self._folded[folded]
+
+    def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
+        """Return it with the ends outside of topics, too, laid out in the same direction."""
+        sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
+        channels = [
+            replace(
+                channel,
+                external=tuple(
+                    dict.fromkeys(
+                        (
+                            *channel.external,
+                            *(sides[end['kind']] for end in outside[channel.id[6:]]),
+                        )
+                    )
+                ),
+            )
+            if channel.kind == 'topic' and channel.id[6:] in outside
+            else channel
+            for channel in self._picture.channels
+        ]
+        picture = replace(self._picture, channels=tuple(channels))
+        return Drawing(picture, self._code, self.shown['direction'])
 
 
 class DrawnFiles:
@@ -137,6 +167,9 @@ class WatchedSystem:
         self.changed: Callable[[], object] = lambda: None
         self._lines = 0
         self._rows: list[dict[str, Any]] = []
+        # As the files say, without ends outside.
+        self._declared: Drawing | None = None
+        self._outside = OutsideEnds()
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
@@ -190,6 +223,7 @@ class WatchedSystem:
                 said |= {'heard': time(), 'period_sec': _STATUS_PERIOD_SEC}
                 if before and before['last_reload'] != said['last_reload']:
                     self._draw(client, system)
+                self._find_outside(client, said)
             self._saved.look()
             try:
                 found = read_health(health(STATUS_SEC))
@@ -204,6 +238,7 @@ class WatchedSystem:
                     'problem': found.get('problem', ''),
                     'status': said,
                     'health': found,
+                    'outside': self._outside.by_topic,
                     'problems': list_problems(said, found),
                     'drawing': self.state.get('drawing', 0),
                     'drawing_problem': self.state.get('drawing_problem', ''),
@@ -234,10 +269,24 @@ class WatchedSystem:
             file = Path((system.status or {}).get('file', ''))
             paths = [file, *(Path(each) for each in given['layers'])]
             self._saved.follow(RunningFiles(text, paths, given['words'], given['set_values']))
-            self.drawing = draw_files(paths, given['words'], given['set_values'])
+            self._declared = draw_files(paths, given['words'], given['set_values'])
         except (ComposerError, DrawingError) as error:
             # The page is for the same computer as the files, and shows the rest without.
-            self.drawing, problem = None, str(error)
+            self._declared, problem = None, str(error)
+        self._outside.forget()
+        self._show(problem)
+
+    def _find_outside(self, client: Client, said: dict[str, Any]) -> None:
+        if (drawing := self._declared) is not None:
+            own = {*said['nodes'], *said['components'], *drawing.nodes}
+            if self._outside.look(client.node, drawing.topics, own):
+                self._show(self.state.get('drawing_problem', ''))
+
+    def _show(self, problem: str) -> None:
+        self.drawing = self._declared
+        outside = self._outside.by_topic
+        if self._declared is not None and outside:
+            self.drawing = self._declared.with_outside(outside)
         number = self.state.get('drawing', 0) + 1
         self._tell({**self.state, 'drawing': number, 'drawing_problem': problem})
 

@@ -373,8 +373,40 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
         wait_for(lambda: old() >= everything, 'an old page')
     finally:
         os.kill(child.pid, signal.SIGCONT)
+    browser.get('about:blank')
     assert page.end() == 130
     assert child.stop() == 0
+
+
+def test_ends_outside_appear_and_go(page, browser, shared_peer):
+    from std_msgs.msg import String
+
+    def outside():
+        return {
+            topic: [(end['kind'], end['node']) for end in ends]
+            for topic, ends in page.json('/api/state')['outside'].items()
+        }
+
+    find, text_of = partial(find_all, browser), partial(read_text, browser)
+    browser.get(page.address)
+    browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fleft%2Fwords')
+    wait_for(lambda: text_of('#details h2').startswith('/left/words'), 'the topic')
+    wait_for(lambda: outside() == {}, 'only ends of its own')
+    assert not find('main svg .external, .outside')
+    name = shared_peer.node.get_fully_qualified_name()
+    publisher = shared_peer.run(shared_peer.node.create_publisher, String, '/left/words', 1)
+    wait_for(lambda: find('main svg .external.node'), 'the publisher in the graph')
+    for place in ('#live .outside', '#tree .outside'):
+        wait_for(lambda place=place: name in text_of(place), place)
+    assert outside() == {'/left/words': [('publisher', name)]}
+    subscription = shared_peer.run(
+        shared_peer.node.create_subscription, String, '/left/words', print, 1
+    )
+    wait_for(lambda: len(find('main svg .external.node')) == 2, 'the subscription in the graph')
+    shared_peer.run(shared_peer.node.destroy_subscription, subscription)
+    shared_peer.run(shared_peer.node.destroy_publisher, publisher)
+    wait_for(lambda: not find('main svg .external, .outside'), 'nothing outside')
+    assert outside() == {}
 
 
 def test_boxes_fold_and_the_address_has_the_view(page, browser):
