@@ -54,6 +54,9 @@ def type_of_state(value: object, stored: Iterable[Mapping[str, frozenset[str]]],
         value: The value in the file; `None` if there is none, as nothing is known of it.
     """
     types = {type(value).__name__}.union(*(names.get(name, frozenset()) for names in stored))
+    if isinstance(value, float) and types <= {*_NUMBERS, '+=', 'NoneType', _ANYTHING}:
+        # What the file declares as a number is one, whatever computes it.
+        return 'float'
     if '+=' in types:
         # A number stays one, with whatever it is added to or multiplied by.
         types = types - {'+='} | ({'float'} if types & _NUMBERS else {_ANYTHING})
