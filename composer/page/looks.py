@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ _ANSWER_SEC = 3.0
 _RELOAD_SEC = 60.0
 _MOST = 500
 _LONGEST_TEXT = 100_000
+_LONGEST_VALUE = 10_000
 
 
 def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
@@ -37,7 +39,7 @@ def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
     return [
         {
             'name': each.name,
-            'value': _plain(parameter_value_to_python(value)),
+            **_describe_value(parameter_value_to_python(value)),
             'description': each.description,
             'read_only': each.read_only,
             'range': _range(each),
@@ -181,6 +183,14 @@ def _find_type(client: Client, kind: str, name: str) -> str:
 def _range(descriptor: Any) -> list[float] | None:
     ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
     return [ranges[0].from_value, ranges[0].to_value] if ranges else None
+
+
+def _describe_value(value: Any) -> dict[str, Any]:
+    """Return a `value`, or the beginning of its text if it `is_cut`."""
+    plain = _plain(value)
+    text = json.dumps(plain)
+    is_cut = len(text) > _LONGEST_VALUE
+    return {'value': f'{text[:_LONGEST_VALUE]}…' if is_cut else plain, 'is_cut': is_cut}
 
 
 def _plain(value: Any) -> Any:

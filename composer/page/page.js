@@ -90,9 +90,13 @@ function isInView(element) {
 }
 
 // The panel.
+// Characters that cannot be seen, or that turn the text around them, become escapes.
+const UNSEEN = /[\0-\x08\x0b-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb]|\p{Surrogate}/gu;
+const clean = (text) => String(text).replace(UNSEEN, (each) => `\\u${each.charCodeAt(0).toString(16).padStart(4, '0')}`);
+
 function make(tag, text = '', className = '') {
   const element = document.createElement(tag);
-  element.textContent = text;
+  element.textContent = clean(text);
   if (className) element.className = className;
   // What scrolls is scrolled with the keyboard, too.
   if (tag === 'pre') element.tabIndex = 0;
@@ -112,7 +116,7 @@ function makeLink(token, text) {
 // A place in a file; it opens the editor, where there is one.
 function makePlace(file, line) {
   const text = line ? `${file}:${line}` : file;
-  if (!state.editor || !file || file.startsWith('--')) return document.createTextNode(text);
+  if (!state.editor || !file || file.startsWith('--')) return document.createTextNode(clean(text));
   const path = file.startsWith('/') ? file : `${folder}/${file}`;
   const link = make('a', text);
   link.href = state.editor.replace('{file}', encodeURI(path)).replace('{line}', line ?? 1);
@@ -128,7 +132,7 @@ function makeExcerpt(excerpt) {
   const width = String(excerpt.first + excerpt.lines.length - 1).length;
   excerpt.lines.forEach((line, index) => {
     text.append(make('span', `${String(excerpt.first + index).padStart(width)}  `, 'number'));
-    text.append(`${line}\n`);
+    text.append(`${clean(line)}\n`);
   });
   block.append(text);
   return block;
@@ -136,7 +140,7 @@ function makeExcerpt(excerpt) {
 
 function makeFinding(finding) {
   const text = make('p', '', finding.severity);
-  text.append(make('b', finding.severity), ` ${finding.rule}: ${finding.message}`);
+  text.append(make('b', finding.severity), clean(` ${finding.rule}: ${finding.message}`));
   if (finding.help) text.append(make('br'), make('span', `help: ${finding.help}`, 'kind'));
   return text;
 }
@@ -549,7 +553,8 @@ function showItems(list, items) {
       return item;
     }));
   }
-  items.forEach(({text}, index) => {
+  items.forEach(({text: said}, index) => {
+    const text = clean(said);
     const place = list.children[index].querySelector('b + span');
     if (place.textContent !== text) place.textContent = text;
   });
@@ -708,11 +713,11 @@ async function askParameters() {
     const about = [each.range ? `${each.range[0]} to ${each.range[1]}` : '',
       each.read_only ? 'read-only' : '', each.description].filter(Boolean).join(', ');
     const value = make('dd');
-    const text = JSON.stringify(each.value);
-    if (state.allows_changes && !each.read_only) {
+    const text = clean(each.is_cut ? each.value : JSON.stringify(each.value));
+    if (state.allows_changes && !each.read_only && !each.is_cut) {
       const wish = () => ({action: 'set', name: part.id.slice(5), parameter: each.name});
-      value.append(makeForm(`Set ${each.name}`, text, wish, 'Set'), ` ${about}`);
-    } else value.append(`${text}  ${about}`);
+      value.append(makeForm(`Set ${each.name}`, text, wish, 'Set'), clean(` ${about}`));
+    } else value.append(`${text}  ${clean(about)}`);
     list.append(make('dt', each.name), value);
   }
   section.append(make('h2', 'Parameters'), make('p', `as of ${clock()}`, 'kind'), list);
@@ -725,7 +730,7 @@ async function act(wish, told) {
     method: 'POST', headers: {'content-type': 'application/json'}, body: JSON.stringify(wish),
   });
   const found = await answer.json().catch(() => ({problem: `refused (${answer.status})`}));
-  told.textContent = found.problem ?? found.text;
+  told.textContent = clean(found.problem ?? found.text);
   told.className = found.problem ? 'error' : '';
 }
 
@@ -783,7 +788,7 @@ function showPlans() {
   const shown = JSON.stringify([next, last, state.allows_changes]);
   if (byId('changes').dataset.shown === shown) return;
   byId('changes').dataset.shown = shown;
-  byId('plan').textContent = (next?.lines ?? []).join('\n');
+  byId('plan').textContent = clean((next?.lines ?? []).join('\n'));
   byId('plan').hidden = !next?.lines.length;
   byId('refused').replaceChildren(...(next?.findings ?? []).map((finding) => {
     const text = makeFinding(finding);
@@ -830,7 +835,7 @@ function showLog() {
   byId('log').replaceChildren(...shown.slice(-MOST_LINES).reverse().map((line) => {
     const level = {warn: 'warn', error: 'error', fatal: 'error'}[line.level] ?? 'ok';
     const item = make('li', '', level);
-    item.append(make('span', `${clock(line.time)} ${line.name} `, 'place'), line.text);
+    item.append(make('span', `${clock(line.time)} ${line.name} `, 'place'), clean(line.text));
     return item;
   }));
 }

@@ -8,6 +8,7 @@ import json
 import math
 import secrets
 import socket
+import sys
 from concurrent.futures import Future
 from contextlib import suppress
 from importlib import resources
@@ -52,6 +53,8 @@ _SHORTEST_PAUSE_SEC = 0.25
 _ANSWER_SEC = 12.0
 _ACT_SEC = 70.0
 _LONGEST_WISH = 100_000
+# Of a message, and of each text in the state: 1 MB would come with each period.
+_LONGEST_TEXT, _LONGEST_WORDS = 100_000, 10_000
 _ASSETS = {'page.css': 'text/css', 'page.js': 'text/javascript'}
 
 
@@ -225,7 +228,7 @@ class PageServer:
         return Response(_read_asset(name), media_type=_ASSETS[name])
 
     async def _state(self, _request: Request) -> Response:
-        return _json(self._shown())
+        return _json(self._shown(), longest=_LONGEST_WORDS)
 
     def _shown(self) -> dict[str, Any]:
         return {**self._source.state, **self._settings, 'time': time()}
@@ -236,7 +239,7 @@ class PageServer:
             return _json({})
         folded = frozenset(request.query_params.getlist('folded'))
         # Graphviz takes a while.
-        return _json(await asyncio.to_thread(drawing.fold, folded))
+        return _json(await asyncio.to_thread(drawing.fold, folded), longest=sys.maxsize)
 
     async def _log(self, request: Request) -> Response:
         after = request.query_params.get('after', '0')
@@ -305,7 +308,7 @@ class PageServer:
             await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
             while not left.done():
                 waker.clear()
-                text = f'data: {_dump(self._shown())}\n\n'
+                text = f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
                 body = {'type': 'http.response.body', 'body': text.encode(), 'more_body': True}
                 await asyncio.wait_for(send(body), _SEND_SEC)
                 await asyncio.wait([left], timeout=_SHORTEST_PAUSE_SEC)
@@ -331,20 +334,22 @@ def _read_asset(name: str) -> str:
     return resources.files('composer.page').joinpath(name).read_text(encoding='utf-8')
 
 
-def _json(data: Any, code: int = 200) -> Response:
+def _json(data: Any, code: int = 200, longest: int = _LONGEST_TEXT) -> Response:
     from starlette.responses import Response
 
-    return Response(_dump(data), status_code=code, media_type='application/json')
+    return Response(_dump(data, longest), status_code=code, media_type='application/json')
 
 
-def _dump(data: Any) -> str:
-    """Return data as JSON, in which no number is infinite."""
-    return json.dumps(_finite(data), separators=(',', ':'))
+def _dump(data: Any, longest: int) -> str:
+    """Return data as JSON, in which no number is infinite, and no text is longer."""
+    return json.dumps(_finite(data, longest), separators=(',', ':'))
 
 
-def _finite(data: Any) -> Any:
+def _finite(data: Any, longest: int) -> Any:
+    if isinstance(data, str) and len(data) > longest:
+        return f'{data[:longest]}…'
     if isinstance(data, float) and not math.isfinite(data):
         return str(data)
     if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    return [_finite(each) for each in data] if isinstance(data, list | tuple) else data
+        return {key[:longest]: _finite(value, longest) for key, value in data.items()}
+    return [_finite(each, longest) for each in data] if isinstance(data, list | tuple) else data

@@ -352,6 +352,7 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
         return set(browser.execute_script(script)) & everything
 
     browser.get(page.address)
+    wait_for(lambda: find_all(browser, 'main svg .node'), 'the drawing')
     browser.get(f'http://127.0.0.1:{page.port}/#node%3A%2Fear')
     wait_for(lambda: 'subscription words' in read_text(browser, '#live'), 'figures')
     wait_for(lambda: not old(), 'fresh figures')
@@ -389,6 +390,7 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
 
     find, text_of = partial(find_all, browser), partial(read_text, browser)
     browser.get(page.address)
+    wait_for(lambda: find_all(browser, 'main svg .node'), 'the drawing')
     browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fleft%2Fwords')
     wait_for(lambda: text_of('#details h2').startswith('/left/words'), 'the topic')
     wait_for(lambda: outside() == {}, 'only ends of its own')
@@ -407,6 +409,89 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
     shared_peer.run(shared_peer.node.destroy_publisher, publisher)
     wait_for(lambda: not find('main svg .external, .outside'), 'nothing outside')
     assert outside() == {}
+
+
+SCRIPTS = [
+    '<script>window.hit = 1</script>',
+    '<img src=x onerror="window.hit = 1">',
+    '<svg onload="window.hit = 1"></svg>',
+    '"><iframe srcdoc="<script>parent.hit = 1</script>"></iframe>',
+    '<a href="javascript:window.hit = 1">here</a>',
+    '</pre></li></ul><style>* {display: none}</style>',
+    "'; window.hit = 1; //",
+    '${window.hit = 1}',
+    '{{window.hit = 1}}',
+    '&lt;script&gt; &amp; &#60;',
+    ']]><!-- <![CDATA[ -->',
+    '__proto__',
+    'a: b\n---\n- !!python/object:os.system {}',
+    '%s%n%00/../../etc',
+]
+# What is not visible, and how it is shown.
+CONTROLS = [0x1B, 0x08, 0x0D, 0x7F, 0x9B, 0x200B, 0x200F, 0x202E, 0x2028, 0x2066, 0xFEFF]
+
+
+def test_hostile_texts_stay_text(compose, browser, peer):
+    """Payloads, log lines and names, values of parameters and errors of calls: 80 and more."""
+    from rcl_interfaces.msg import Log
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from sensor_msgs.msg import JointState
+
+    texts = SCRIPTS + [f'{script}{chr(code)}end' for code in CONTROLS for script in SCRIPTS[:6]]
+    shown = SCRIPTS + [f'{script}\\u{code:04x}end' for code in CONTROLS for script in SCRIPTS[:6]]
+    assert len(texts) == 80
+    long = SCRIPTS[1] + 'x' * 1_000_000
+    system = """
+        version: 1
+        nodes:
+          ear:
+            parameters: {texts: {default: ['']}, long: {default: ''}}
+            subscriptions:
+              names: {topic: /names, type: sensor_msgs/msg/JointState, behaviour: 'parts:hear', external: true}
+    """
+    child = compose(system, 'def hear(node, message):\n    raise ValueError(message.name[0])')
+    child.wait_until_ready()
+    page = Page(compose.domain_id, 'system', '--allow-changes')
+    find, text_of = partial(find_all, browser), partial(read_text, browser)
+    browser.get(page.address)
+    wait_for(lambda: page.json('/api/state').get('health'), 'the system to answer')
+    for parameter, value in (('texts', texts), ('long', long[:90_000])):
+        wish = {'action': 'set', 'name': '/ear', 'parameter': parameter, 'text': json.dumps(value)}
+        status, told = page.act(wish)
+        assert status == 200, told
+
+    def contents(selector):
+        script = (
+            'return [...document.querySelectorAll(arguments[0])].map((each) => each.textContent)'
+        )
+        return '\n'.join(browser.execute_script(script, selector))
+
+    profile = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    log = peer.run(peer.node.create_publisher, Log, '/rosout', profile)
+    names = peer.run(peer.node.create_publisher, JointState, '/names', 1)
+    wait_for(lambda: log.get_subscription_count() and names.get_subscription_count(), 'a match')
+    for text in [long, *texts]:
+        log.publish(Log(level=30, name=text, msg=text))
+    wait_for(lambda: shown[-1] in contents('#log li'), 'the log')
+    assert [text for text in shown if contents('#log li').count(text) < 2] == []
+    peer.run(peer.node.create_timer, 0.05, lambda: names.publish(JointState(name=[long, *texts])))
+    wait_for(lambda: 'ValueError' in contents('#log li'), 'an error of a call')
+    answer = wait_for(lambda: page.json('/api/message?topic=/names').get('text'), 'a message')
+    assert len(answer) <= 100_001
+    browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fnames')
+    wait_for(lambda: find('#message button'), 'the topic')[0].click()
+    wait_for(lambda: '<img src=x' in contents('#message pre'), 'the message')
+    find('#search')[0].send_keys('ear\n')
+    wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the page to be usable')
+    values = 'return document.querySelector("#parameters input")?.value ?? ""'
+    wait_for(lambda: SCRIPTS[0] in browser.execute_script(values), 'parameters')
+    assert 'xxx…' in contents('#parameters dd')
+    assert len(json.dumps(page.json('/api/state'))) < 100_000
+    assert browser.execute_script('return window.hit') is None
+    assert not find('img, iframe, style, body script:not([src])')
+    browser.get('about:blank')
+    assert page.end() == 130
+    assert child.stop() == 0
 
 
 def test_boxes_fold_and_the_address_has_the_view(page, browser):
