@@ -6,6 +6,7 @@ const isolation = document.getElementById('isolation');
 const MOST_MATCHES = 200;
 const MOST_LINES = 300;
 const MOST_POINTS = 60;
+const SAMPLE_MS = 1000;
 const byId = (id) => document.getElementById(id);
 
 // What is shown: the drawing with its parts by token, and the latest state.
@@ -187,6 +188,15 @@ function makeLinks(ends) {
   return list;
 }
 
+// What is made anew keeps the focus: on the same part, box or problem.
+function replace(list, items) {
+  const nameOf = (element) => [element.dataset.token, element.parentElement.dataset.space].join();
+  const focused = list.contains(document.activeElement) ? nameOf(document.activeElement) : null;
+  list.replaceChildren(...items);
+  if (focused === null) return;
+  [...list.querySelectorAll('button, summary')].find((each) => nameOf(each) === focused)?.focus();
+}
+
 // Selection, by pointer, keyboard, list or address.
 const shapeOf = (token) => document.getElementById(standsIn[token] ?? token);
 let chosen = null;
@@ -277,7 +287,10 @@ function press(token) {
 function choose(token, mustBeSeen) {
   chosen = parts.has(token) ? token : null;
   remember();
+  const hadFocus = byId('details').contains(document.activeElement);
   describe(chosen);
+  // Its links are others now: the keyboard goes on from the top of the selection.
+  if (hadFocus) document.querySelector('aside').focus();
   showLive();
   askParameters();
   offerMessage();
@@ -384,7 +397,7 @@ function find() {
   svg.classList.toggle('searching', words.length > 0);
   byId('count').textContent = words.length ? `${found.length} found` : '';
   byId('found').hidden = words.length === 0;
-  document.getElementById('matches').replaceChildren(...found.slice(0, MOST_MATCHES).map(
+  replace(byId('matches'), found.slice(0, MOST_MATCHES).map(
     (token) => makeLink(token, `${parts.get(token).kind} ${parts.get(token).name}`),
   ));
   return found;
@@ -543,7 +556,7 @@ function showItems(list, items) {
   const keys = JSON.stringify(items.map(({level, part}) => [level, part, tokens.get(part)]));
   if (list.dataset.keys !== keys) {
     list.dataset.keys = keys;
-    list.replaceChildren(...items.map(({level, part}) => {
+    replace(list, items.map(({level, part}) => {
       const token = tokens.get(part);
       const item = token ? makeLink(token, '') : make('li');
       const line = make('span', '', level);
@@ -589,7 +602,7 @@ function showTree() {
   }
   const open = new Set([...document.querySelectorAll('#tree details:not([open])')]
     .map((each) => each.dataset.space));
-  byId('tree').replaceChildren(...[...groups].map(([space, members]) => {
+  replace(byId('tree'), [...[...groups].map(([space, members]) => {
     const fold = make('details');
     fold.dataset.space = space;
     fold.open = !open.has(space);
@@ -609,7 +622,7 @@ function showTree() {
     const item = make('li');
     item.append(fold);
     return item;
-  }), ...listOutside());
+  }), ...listOutside()]);
 }
 
 // The publishers and subscriptions of other programs, each a link to its topic.
@@ -801,17 +814,32 @@ function showPlans() {
 }
 byId('reload').addEventListener('click', () => act({action: 'reload'}, byId('told')));
 
-// A message of the chosen topic, when somebody asks for one.
+// Messages of the chosen topic, one a second, from when somebody asks for them until he pauses.
 function offerMessage() {
   const section = byId('message');
   section.replaceChildren();
   const part = parts.get(chosen);
   if (!state.runs || part?.kind !== 'topic') return;
-  const button = make('button', 'Look at a message');
+  const button = make('button', 'Look at messages');
+  const [about, text] = [make('p', '', 'kind'), make('pre')];
   button.type = 'button';
-  button.addEventListener('click', async () => {
+  let looks = false;
+  const look = async () => {
+    if (!looks || !button.isConnected) return;
+    const begun = Date.now();
     const found = await get(`api/message?topic=${encodeURIComponent(part.name)}`);
-    section.replaceChildren(make('h2', 'Message'), button, make('p', `as of ${clock()}`, 'kind'), make('pre', found.text ?? found.problem));
+    if (!looks) return;
+    about.textContent = `as of ${clock()}`;
+    text.textContent = clean(found.text ?? found.problem);
+    if (!text.isConnected) section.append(about, text);
+    // Of a slow topic, one at a time: the page waits for it.
+    if (found.problem || Date.now() - begun > SAMPLE_MS) button.click();
+    else setTimeout(look, SAMPLE_MS);
+  };
+  button.addEventListener('click', () => {
+    looks = !looks;
+    button.textContent = looks ? 'Pause' : 'Go on';
+    look();
   });
   section.append(make('h2', 'Message'), button);
 }

@@ -494,6 +494,67 @@ def test_hostile_texts_stay_text(compose, browser, peer):
     assert child.stop() == 0
 
 
+def test_the_keyboard_alone_reaches_all(acting, browser):
+    from selenium.webdriver import ActionChains, Keys
+
+    find, text_of = partial(find_all, browser), partial(read_text, browser)
+    seen = """const focused = document.activeElement;
+        const style = getComputedStyle(focused);
+        const shape = focused.closest('svg') && getComputedStyle(focused.querySelector(':not(text):not(title)'));
+        return [focused.matches(arguments[0]), focused === document.body
+            || parseFloat(style.outlineWidth) > 0 && style.outlineStyle !== 'none'
+            || shape?.stroke === 'rgb(251, 133, 0)' || shape?.stroke === 'rgb(255, 166, 87)']"""
+
+    def press(*keys):
+        ActionChains(browser).send_keys(*keys).perform()
+
+    def go_to(selector, key=None):
+        """Go there by Tab, and see at each step where the focus is."""
+        for _ in range(120):
+            press(Keys.TAB)
+            is_there, is_seen = browser.execute_script(seen, selector)
+            assert is_seen, browser.execute_script('return document.activeElement.outerHTML')
+            if is_there:
+                return press(key) if key else None
+        return pytest.fail(f'Tab does not reach {selector}')
+
+    def heading():
+        return text_of('#details h2')
+
+    browser.get(acting.address)
+    wait_for(lambda: find('main svg .node') and find('#tree button'), 'the drawing')
+    press('/', 'talker', Keys.ENTER)
+    wait_for(lambda: heading().startswith('/left/talker'), 'what was searched')
+    go_to('#matches button', Keys.ENTER)
+    press(Keys.ESCAPE)
+    go_to('#tree summary', Keys.ENTER)
+    wait_for(lambda: find('#tree details:not([open])'), 'the closed namespace')
+    press(Keys.ENTER)
+    wait_for(lambda: not find('#tree details:not([open])'), 'the open namespace')
+    go_to('#tree [data-id="node:/ear"] button', Keys.ENTER)
+    wait_for(lambda: heading().startswith('/ear'), 'the node of the tree')
+    go_to('#stage')
+    box = find('main svg')[0].get_dom_attribute('viewBox')
+    press(Keys.ARROW_LEFT)
+    wait_for(lambda: find('main svg')[0].get_dom_attribute('viewBox') != box, 'a move')
+    go_to('[aria-label="namespace /left"]', Keys.ENTER)
+    wait_for(lambda: find('main svg .folded:focus'), 'the folded box')
+    press(Keys.ENTER)
+    wait_for(lambda: find('main svg .cluster:focus'), 'the open box')
+    go_to('[aria-label="topic /left/words"]', Keys.ENTER)
+    wait_for(lambda: heading().startswith('/left/words'), 'the topic')
+    go_to('#message button', Keys.ENTER)
+    wait_for(lambda: EVIL in text_of('#message pre'), 'a message')
+    assert text_of('#message button:focus') == 'Pause'
+    press(Keys.ENTER)
+    wait_for(lambda: text_of('#message button:focus') == 'Go on', 'the pause')
+    press('/', '/left/switch', Keys.ENTER)
+    wait_for(lambda: find('#acts form button'), 'the service')
+    go_to('#acts textarea')
+    go_to('#acts button', Keys.ENTER)
+    wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
+
+
 def test_boxes_fold_and_the_address_has_the_view(page, browser):
     from selenium.common import StaleElementReferenceException
     from selenium.webdriver import ActionChains, Keys
