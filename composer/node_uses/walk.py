@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
-from composer.node_uses.reading import Awaited, MessageUse, StateUse
+from composer.node_uses.reading import Awaited, MessageUse, Payload, StateUse
 from composer.node_uses.ros_members import ros_members
 from composer.node_uses.values import (
     Chain,
@@ -21,6 +21,7 @@ from composer.node_uses.values import (
     Texts,
     Value,
 )
+from composer.python_source.annotations import find_interface
 from composer.python_source.local_names import list_arguments
 from composer.python_source.modules import read_signature
 from composer.python_source.places import span_of
@@ -780,6 +781,23 @@ class Walk:
                     return
             case External(name='time.sleep') if call.args:
                 waiting.note_sleep(self.run, call.args[0], call, scope)
+            case External(name='composer.AbortedError'):
+                for node in call.args[1:2]:
+                    payload = Payload('', 'aborted', '', node, scope.module, self.run.is_certain)
+                    self.run.reading.payloads.append(payload)
+            case External(name=name) if (interface := find_interface(name)) is not None:
+                for each in call.keywords:
+                    if each.arg and not (self.run.guards or self.run.broad_guards):
+                        use = MessageUse(
+                            (each.arg,),
+                            each.value,
+                            scope.module,
+                            is_write=True,
+                            is_certain=not self.run.doubts,
+                            of_type=interface,
+                            value=each.value,
+                        )
+                        self.run.reading.message_uses.append(use)
             case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):
                 if self._call_attribute(func.name, call, scope):
                     return

@@ -23,6 +23,7 @@ class Wire:
         given: The type of its second argument.
         yielded: The type that each yielded payload becomes.
         returned: The type that a returned payload becomes.
+        aborted: The type of the result with which an action aborts a goal.
         is_unpublished: Whether nothing publishes what it gives, although `publish:` could.
         needs_payload: Whether a response has to be returned.
         is_read_only: Whether others have what it is given, too.
@@ -31,6 +32,7 @@ class Wire:
     given: str | None = None
     yielded: str | None = None
     returned: str | None = None
+    aborted: str | None = None
     needs_payload: bool = False
     is_unpublished: bool = False
     is_read_only: bool = False
@@ -60,6 +62,7 @@ def wire_of(node: NodeSpec, binding: Binding, has_real_type: Callable[[EndSpec],
         given=None if getattr(binding.entity, 'raw', False) else type_of(key.given),
         yielded=type_of(key.yielded),
         returned=type_of(key.returned),
+        aborted=type_of(key.returned) if kind.channel == 'action' else None,
         needs_payload=key.returned not in (None, PUBLISHED),
         is_unpublished=key.returned == PUBLISHED and published is None,
         is_read_only=isinstance(binding.entity, SubscriptionSpec) and binding.entity.read_only,

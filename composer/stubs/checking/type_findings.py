@@ -35,7 +35,7 @@ _Problem: TypeAlias = 'tuple[ast.expr, str, str, str | None]'
 
 _ATTRIBUTE = re.compile(r'(?:Object of class|Class) `(\w+)` has no (?:class )?attribute `(\w+)`')
 _ARGUMENT = re.compile(
-    r'Argument `([^`]+)` is not assignable to parameter `(\w+)` with type `[^`]+` '
+    r'Argument `([^`]+)` is not assignable to parameter `(\w+)` with type `([^`]+)` '
     r'in function `([\w.]+)`'
 )
 _RETURNED = re.compile(r'(?:Returned|Yielded) type `([^`]+)`')
@@ -50,6 +50,8 @@ _DICT = re.compile(r'^dict\[str, (.*)\]$')
 _TIME = re.compile(r'^rclpy\.\w+\.(Time|Duration)$')
 _UNARY = re.compile(r'Type `([^`]+)` is not (?:iterable|awaitable)')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
+# A value that no plain field takes.
+_COLLECTION = re.compile(r'(?:dict|list|set|tuple)\[[^|]*\]')
 _PARTS = {
     'Logger': 'the logger',
     'Goal': 'a goal',
@@ -259,7 +261,7 @@ class TypeFindings:
             return None
         # If the name does not fit, the payload is compared with that of another name.
         wrong_names = [match for match in matches if match[1] == 'name']
-        given, parameter, function = (wrong_names or matches)[-1]
+        given, parameter, wanted, function = (wrong_names or matches)[-1]
         given = _TIME.sub(r'\1', given)
         module, _, method = function.rpartition('.')
         owner = module.rpartition('.')[2]
@@ -270,6 +272,9 @@ class TypeFindings:
         if not values:
             return None
         if match is None:
+            if function == 'list.append' and self.messages.get(wanted) and given in _SCALARS:
+                message = f'expected {self._shown(wanted)}, got {given}'
+                return values[0], 'field-type', message, None
             return self._passed(places, report, values[0], given, function)
         field = parameter if match[4] == '__init__' else match[4]
         return self._stored(f'{match[1]}/{match[2]}/{match[3]}', field, values[0], given)
@@ -428,6 +433,8 @@ class TypeFindings:
         if field is None:
             return None
         is_message = self._is_other_message(field.type, given, is_stored=is_stored)
+        is_plain = not (field.type.array or field.type.nested)
+        is_message |= is_plain and _COLLECTION.fullmatch(given) is not None
         names = _certain(given)
         fits = not names or any(self._fits(field.type, each, is_stored) for each in names)
         if fits and not is_message:
@@ -605,6 +612,13 @@ class TypeFindings:
 
     def _unknown_choice(self, use: FunctionUse, node: ast.AST) -> _Problem | None:
         match node:
+            case ast.Match(subject=ast.Attribute() as subject, cases=cases):
+                patterns = (each.pattern for each in cases)
+                tests = (each.value for each in patterns if isinstance(each, ast.MatchValue))
+                pairs = (ast.Compare(subject, [ast.Eq()], [test]) for test in tests)
+                return next(
+                    filter(None, (self._unknown_choice(use, each) for each in pairs)), None
+                )
             case ast.Compare(
                 left=ast.Attribute(
                     value=ast.Attribute(attr='parameters', value=ast.Name(id=owner)), attr=name

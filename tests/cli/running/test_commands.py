@@ -265,6 +265,7 @@ def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
         'components': [],
         'lifecycles': {},
         'external_processes': [],
+        'workers': [],
     }
     pretend('first', '{')
     pretend('second', json.dumps({**known, 'nodes': []}))
