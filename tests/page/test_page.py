@@ -608,6 +608,9 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     from selenium.webdriver import Keys
 
     find, text_of = partial(find_all, browser), partial(read_text, browser)
+    # The page of an earlier test asks a server that has ended.
+    browser.get('about:blank')
+    browser.get_log('browser')
     browser.get(page.address)
     wait_for(lambda: 'subscription words of /ear' in text_of('#problems'), 'the problem')
     wait_for(lambda: find('main svg .node.hurts, main svg .node.warns'), 'the node that hurts')
