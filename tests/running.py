@@ -1,6 +1,7 @@
 """What tests of running systems share: a ROS domain, Composer in a child process, a plain peer."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -64,7 +65,9 @@ def is_there(pid):
 def reserved_domain():
     """Return a ROS domain that no process is in, and that no other run of tests takes meanwhile."""
     with ExitStack() as reserved:
-        yield next(domain for domain in _domains() if _reserve(domain, reserved))
+        domain = next(domain for domain in _domains() if _reserve(domain, reserved))
+        _remove_left_ports(domain)
+        yield domain
 
 
 def _domains():
@@ -84,6 +87,19 @@ def _reserve(domain, reserved):
         except OSError:
             return False
     return True
+
+
+def _remove_left_ports(domain):
+    """Remove the ports of shared memory that killed processes have left in a domain.
+
+    A plain program that gets one of these may hear nothing, or nobody hears it.
+    """
+    numbers = range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
+    for path in Path('/dev/shm').glob('*port*'):
+        found = re.fullmatch(r'(sem\.)?fast(rtps|dds)_port(\d+)(_el|_mutex)?', path.name)
+        if found and int(found[3]) in numbers:
+            with suppress(OSError):
+                path.unlink()
 
 
 class Child:

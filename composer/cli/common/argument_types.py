@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import re
+import shlex
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -24,6 +25,8 @@ _Command = TypeVar('_Command', bound='Callable[..., Any]')
 NUMBERS_ARE_VALUES = {'ignore_unknown_options': True}
 _LOG_LEVEL = re.compile(r'([\w/.]+:=)?(debug|info|warn|error|fatal)', re.IGNORECASE)
 # A dash before a digit or a dot starts a number.
+# What rcl takes, and Composer only after --ros-args.
+_OF_ROS = frozenset(('-p', '-r', '--param', '--params-file', '--remap', '--log-config-file'))
 _OPTION = re.compile(r'-[^\W\d]|--')
 
 
@@ -146,6 +149,10 @@ def refuse_options(words: Sequence[str]) -> None:
     for index, word in enumerate(words):
         if _OPTION.match(word):
             _refuse_argument(words, index)
+            if word in _OF_ROS:
+                message = f"no such option '{word}': ROS arguments follow --ros-args"
+                given = shlex.join(words[index : index + 2])
+                raise UsageError(message, help=f"write '--ros-args {given}'")
             raise click.NoSuchOption(word, possibilities=_find_near(word, context), ctx=context)
     if not words:
         message = "Missing argument 'FILE'."

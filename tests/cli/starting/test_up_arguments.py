@@ -73,6 +73,12 @@ def test_an_unknown_option_is_an_error_and_no_value(run, option):
     assert f'no such option {option!r}' in err or f'no such option: {option}' in err
 
 
+def test_an_option_of_ros_is_shown_where_it_goes(run):
+    code, _, err = run('up', 'configs/calculator_client.yaml', '--params-file', 'a b.yaml')
+    assert code == 2
+    assert err.endswith("help: write '--ros-args --params-file 'a b.yaml''")
+
+
 def test_negative_numbers_are_values_and_no_options(run):
     code, _, err = run('up', 'configs/calculator_client.yaml', '-5', '-6', '-7')
     assert code == 2
