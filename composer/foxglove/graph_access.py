@@ -65,7 +65,8 @@ class GraphAccess:
             # It may have gone meanwhile.
             with suppress(NodeNameNonExistentError):
                 for service, _ in node.get_service_names_and_types_by_node(name, namespace):
-                    servers[service].append(join_names(namespace, name))
+                    if '/_' not in service:
+                        servers[service].append(join_names(namespace, name))
         published = {each: _nodes_of(node.get_publishers_info_by_topic(each)) for each in topics}
         heard = {each: _nodes_of(node.get_subscriptions_info_by_topic(each)) for each in topics}
         if self.graph == (published, heard, servers):
