@@ -35,6 +35,7 @@ class Run:
     Attributes:
         doubts: The number of conditions around the place on which the file decides.
         state_doubts: Likewise, on which what is kept in the state does.
+        held_states: The names of the state of which one of the latter is that they hold.
         fixed: Those of the first that hang on a constant, a type or the node's name.
         guards: The number of statements around it that catch what a wrong name raises.
         broad_guards: The number of statements around it that catch everything.
@@ -48,6 +49,7 @@ class Run:
         self.doubts = 0
         self.state_doubts = 0
         self.fixed = 0
+        self.held_states: tuple[str, ...] = ()
         self.guards = 0
         self.broad_guards = 0
         self.held_locks: list[tuple[Made, int]] = []
@@ -59,30 +61,31 @@ class Run:
         return not (self.doubts or self.state_doubts or self.broad_guards)
 
     @property
-    def standing(self) -> tuple[int, int, int]:
+    def standing(self) -> tuple[int, int, int, tuple[str, ...]]:
         """The conditions that a function may leave behind."""
-        return self.doubts, self.state_doubts, self.fixed
+        return self.doubts, self.state_doubts, self.fixed, self.held_states
 
     @standing.setter
-    def standing(self, counts: tuple[int, int, int]) -> None:
-        self.doubts, self.state_doubts, self.fixed = counts
+    def standing(self, conditions: tuple[int, int, int, tuple[str, ...]]) -> None:
+        self.doubts, self.state_doubts, self.fixed, self.held_states = conditions
 
     @contextmanager
-    def condition(self, chosen: str) -> Iterator[None]:
+    def condition(self, chosen: str, held: str = '') -> Iterator[None]:
         """Note what is read meanwhile as read on a condition of the file, or the state.
 
         What hangs on a constant, a type or the name of the node may be for another case.
         """
         before = self.standing
-        self.doubt(chosen)
+        self.doubt(chosen, held)
         try:
             with self.guard(is_guard=chosen == 'fixed'):
                 yield
         finally:
             self.standing = before
 
-    def doubt(self, chosen: str) -> None:
+    def doubt(self, chosen: str, held: str = '') -> None:
         """Note a condition from here on."""
+        self.held_states += (held,) if held else ()
         self.doubts += chosen in ('file', 'fixed')
         self.state_doubts += chosen == 'state'
         self.fixed += chosen == 'fixed'

@@ -112,6 +112,21 @@ class StateUse:
 
 
 @record
+class NeededValue:
+    """A parameter or state that has to have a value.
+
+    Attributes:
+        of: `parameters` or `state`.
+        held: The names of the state on which alone it depends: they have to hold.
+    """
+
+    of: str
+    name: str
+    place: Span
+    held: tuple[str, ...] = ()
+
+
+@record
 class RemoteParameter:
     """A parameter that `node.set_parameters` or `node.get_parameters` names.
 
@@ -228,7 +243,7 @@ class Reading:
         created: The entities that it creates.
         payloads: What it sends, yields and returns, as it is written.
         message_uses: What it reads and writes of the message.
-        values_needed: The parameters that have to have a value, and where.
+        values_needed: The parameters and states that have to have a value, and where.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -253,7 +268,7 @@ class Reading:
     created: list[CreatedEntity] = field(default_factory=list)
     payloads: list[Payload] = field(default_factory=list)
     message_uses: list[MessageUse] = field(default_factory=list)
-    values_needed: list[tuple[str, Span]] = field(default_factory=list)
+    values_needed: list[NeededValue] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""

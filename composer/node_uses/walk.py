@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
-from composer.node_uses.reading import Awaited, MessageUse, Payload, StateUse
+from composer.node_uses.reading import Awaited, MessageUse, NeededValue, Payload, StateUse
 from composer.node_uses.ros_members import ros_members
 from composer.node_uses.values import (
     Chain,
@@ -121,7 +121,8 @@ class Walk:
         self.run = Run(names)
         self.followed = followed
         self._names = names
-        self._depth = 0
+        # The functions under way, the behaviour first.
+        self._under_way: list[Scope] = []
         self._steps = 0
         self._entered: set[object] = set()
         self._asked: dict[int, set[str]] = {}
@@ -145,20 +146,20 @@ class Walk:
         stored = self._names.stored_in(definition)
         chains = {name: value for name, value in given.items() if isinstance(value, Chain)}
         for name, chain in chains.items():
-            if name in stored or self._depth >= _DEEPEST:
+            if name in stored or len(self._under_way) >= _DEEPEST:
                 run.escape(chain)
-        if self._depth >= _DEEPEST:
+        if len(self._under_way) >= _DEEPEST:
             return
         self.followed.add(id(definition))
         scope = Scope(function.module, definition, given, function.scope, waits=is_waited)
         run.reading.modules.setdefault(id(function.module), function.module)
         before = run.standing
-        self._depth += 1
+        self._under_way.append(scope)
         if isinstance(definition, ast.Lambda):
             self.visit(definition.body, scope)
         else:
             self._block(definition.body, scope)
-        self._depth -= 1
+        self._under_way.pop()
         run.standing = before
 
     def _follow(
@@ -266,23 +267,32 @@ class Walk:
         self.visit(node.test, scope)
         if isinstance(node, ast.While):
             waiting.note_loop(self.run, node, scope)
-        with self.run.condition(chosen):
+        with self.run.condition(chosen, self._state_name(node.test, scope)):
             self._block(node.body, scope)
+        with self.run.condition(chosen):
             if isinstance(node, ast.While):
                 self._else(node.orelse, scope)
             else:
                 self._block(node.orelse, scope)
-        self._doubt_rest(node, chosen)
+        held = self._state_name(node.test.operand, scope) if _is_not(node.test) else ''
+        self._doubt_rest(node, chosen, held)
+
+    def _state_name(self, test: ast.expr, scope: Scope) -> str:
+        """Return the name of `node.state` that is all of a test."""
+        match self._names.value_of(test, scope):
+            case Chain(path=('node', 'state', name)):
+                return name
+        return ''
 
     def _else(self, body: Sequence[ast.stmt], scope: Scope) -> None:
         """Walk through what comes only where a loop did not break, or nothing was raised."""
         with self.run.condition('file'):
             self._block(body, scope)
 
-    def _doubt_rest(self, node: ast.AST, chosen: str) -> None:
+    def _doubt_rest(self, node: ast.AST, chosen: str, held: str = '') -> None:
         """Note that what follows is only reached where a branch does not end before."""
         if any(isinstance(each, _ENDS) for each in ast.walk(node)):
-            self.run.doubt(chosen)
+            self.run.doubt(chosen, held)
 
     def _try(self, node: ast.Try | ast.TryStar, scope: Scope) -> None:
         is_guard = any(map(_is_guard, node.handlers))
@@ -477,7 +487,7 @@ class Walk:
         return [value for value, _ in stored if value is not None]
 
     def _asked_in(self, scope: Scope) -> set[str]:
-        """Return the parameters that a function asks whether they have a value."""
+        """Return the parameters and states that a function asks whether they have a value."""
         if scope.definition is None:
             return set()
         key = id(scope.definition)
@@ -487,18 +497,29 @@ class Walk:
                 for node in ast.walk(test):
                     if isinstance(node, ast.Attribute | ast.Name):
                         match self._names.value_of(node, scope):
-                            case Chain(path=('node', 'parameters', name, *_)):
-                                self._asked[key].add(name)
+                            case Chain(path=('node', 'parameters' | 'state' as of, name, *_)):
+                                self._asked[key].add(f'{of}.{name}')
         return self._asked[key]
 
     def need(self, node: ast.expr, scope: Scope) -> None:
-        """Note that something has to have a value: a parameter may be unset."""
+        """Note that something has to have a value: a parameter or a state may be unset."""
         match self._names.value_of(node, scope):
-            case Chain(path=('node', 'parameters', name)):
-                is_ready = self.run.guards or self.run.broad_guards or self.run.doubts
-                if name not in _OF_MAPPING and not is_ready and name not in self._asked_in(scope):
-                    place = span_of(scope.module, node)
-                    self.run.reading.values_needed.append((name, place))
+            case Chain(path=('node', 'parameters' | 'state' as of, name)):
+                run, full = self.run, f'{of}.{name}'
+                is_ready = run.guards or run.broad_guards or run.doubts
+                is_set = of == 'state' and name in run.reading.state_set
+                # A caller may have asked before.
+                asked = (self._asked_in(each) for each in (scope, *self._under_way))
+                if (
+                    name in _OF_MAPPING
+                    or is_ready
+                    or is_set
+                    or any(full in each for each in asked)
+                ):
+                    return
+                if of == 'parameters' or len(run.held_states) == run.state_doubts:
+                    needed = NeededValue(of, name, span_of(scope.module, node), run.held_states)
+                    run.reading.values_needed.append(needed)
 
     # Expressions
 
@@ -687,6 +708,8 @@ class Walk:
                     run.reading.is_state_open = True
                 elif isinstance(owner, ast.Attribute):
                     run.use_state(name, scope.module, owner)
+                    if owner is not node:
+                        self.need(owner, scope)
             case ('node', 'ros', *_):
                 run.reading.reaches_ros = True
                 run.reading.open_kinds.add('parameter')
@@ -939,6 +962,10 @@ class Walk:
         for node in call.args[2:]:
             self.visit(node, scope)
         return True
+
+
+def _is_not(test: ast.expr) -> TypeGuard[ast.UnaryOp]:
+    return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
 
 
 def _operands(node: ast.Compare | ast.BinOp | ast.Call) -> list[ast.expr]:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from composer.node_uses.wires import Wire
     from composer.python_source.modules import ModuleSource
 
+_ASK = 'give it a default, or ask whether it is None'
 Readings = list[tuple['Binding', 'Reading']]
 
 
@@ -89,7 +90,8 @@ def _explain_problems(
             *reading.problems,
             *_check_payloads(context, node, wire, reading, binders),
             *check_message_uses(context.types, wire, reading, is_one=len(types) == 1),
-            *_check_values_needed(node, reading),
+            *_check_parameters_needed(node, reading),
+            *_check_states_needed(node, binding, reading, readings),
         ]
         returned = context.types.describe(wire.returned) if wire.returned else None
         for each in problems:
@@ -132,16 +134,34 @@ def _check_payloads(
                 yield problem
 
 
-def _check_values_needed(node: NodeSpec, reading: Reading) -> Iterator[Problem]:
+def _check_parameters_needed(node: NodeSpec, reading: Reading) -> Iterator[Problem]:
     """Check that parameters have a value where nothing asks whether they have one."""
     if node.has_other_parameters or node.parameter_files:
         return
-    for name, place in reading.values_needed:
-        parameter = node.parameters.get(name)
+    for needed in reading.values_needed:
+        parameter = node.parameters.get(needed.name) if needed.of == 'parameters' else None
         if parameter is not None and parameter.value is None and parameter.type is not None:
-            text = f"the parameter '{name}' has no value until something sets it: this may be None"
-            help_text = 'give it a default, or ask whether it is None'
-            yield Problem('no-value', text, place, help_text)
+            text = f"the parameter '{needed.name}' has no value until something sets it"
+            yield Problem('no-value', f'{text}: this may be None', needed.place, _ASK)
+
+
+def _check_states_needed(
+    node: NodeSpec, binding: Binding, reading: Reading, readings: Readings
+) -> Iterator[Problem]:
+    """Check likewise names of the state that are null at first, and that no start sets."""
+    if binding.kind is None or any(each.is_state_open for _, each in readings):
+        return
+    early = {
+        name
+        for each, read in readings
+        for name in read.state_set
+        if each.kind is None or each.behaviour.class_name
+    }
+    for needed in reading.values_needed:
+        is_null = needed.of == 'state' and node.state.get(needed.name, '') is None
+        if is_null and needed.name not in early and all(map(node.state.get, needed.held)):
+            text = f"'{needed.name}' of the state is None until a behaviour sets it"
+            yield Problem('no-value', text, needed.place, _ASK)
 
 
 def _publishing_behaviours(context: CheckContext) -> set[str]:

@@ -6,7 +6,7 @@ import pytest
 
 SYSTEM = """
   rover:
-    state: {ready: false, items: [], event: null}
+    state: {ready: false, items: [], event: later}
     subscriptions:
       go: {type: std_msgs/msg/Empty, behaviour: parts:go, external: true}
     timers:
@@ -189,14 +189,14 @@ def test_of_two_who_meet_at_a_barrier_neither_may_wait_for_the_other(check):
             BOTH.wait()
     """
     nodes = SYSTEM.replace('state', 'description').replace(
-        '{ready: false, items: [], event: null}', 'x'
+        '{ready: false, items: [], event: later}', 'x'
     )
     assert check(nodes, code, installed=False) == [(7, 'blocked-group'), (10, 'blocked-group')]
 
 
 def test_another_node_sets_what_a_node_waits_for(check):
     other = SYSTEM.replace(
-        '    timers:', '  other:\n    state: {ready: false, items: [], event: null}\n    timers:'
+        '    timers:', '  other:\n    state: {ready: false, items: [], event: later}\n    timers:'
     )
     assert check_body(check, 'GO.wait()', other) == []
 
