@@ -28,13 +28,16 @@ _peers = []
 
 
 def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
-    """Return the first true result of `condition`; fail after a deadline, or as a peer has."""
+    """Return the first true result of `condition`; fail after a deadline, or as a peer has.
+
+    `what` may be a function: what it returns then shows how it was at the deadline.
+    """
     deadline = time.monotonic() + timeout_sec
     while not (result := condition()):
         for peer in _peers:
             peer.check()
         if time.monotonic() > deadline:
-            pytest.fail(f'in vain waited for {what}')
+            pytest.fail(f'in vain waited for {what() if callable(what) else what}')
         time.sleep(0.01)
     return result
 

@@ -100,7 +100,7 @@ def test_the_wheels_of_the_robot_follow_the_governed_command(
     heard = {name: peer.listen(Float64, f'{name}/speed') for name in expected}
     child = up('robot', *words)
     names = {*expected, f'/{robot}/governor'}
-    wait_for(lambda: nodes_of(peer) == names, f'the nodes {names}')
+    wait_for(lambda: nodes_of(peer) == names, lambda: f'{names}, not {nodes_of(peer)}')
     commands = peer.advertise(Twist, f'/{robot}/cmd_vel')
     publish_until(commands, driving(*command), lambda: all(heard.values()), 'all wheels')
 
@@ -129,7 +129,7 @@ def test_the_camera_is_simulated_by_default(up, peer, wait_for):
 
     assert (heard[0].header.frame_id, list(heard[0].data)) == ('camera', [0, 255])
     nodes = {'/simulated_camera', '/preview'}
-    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
     assert child.stop() == 0
 
 
@@ -176,7 +176,7 @@ def test_the_camera_is_a_driver_of_its_own_if_it_is_real(up, peer, wait_for, ins
 
     assert (heard[0].width, heard[0].height) == (640, 480)
     nodes = {'/v4l2_camera', '/preview'}
-    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
     assert child.stop() == 0
 
 
@@ -195,7 +195,7 @@ def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for
     wait_for(lambda: ranges, 'a measurement')
     assert ranges[0].header.frame_id == 'range_sensor'
     nodes = {'/front/range_sensor', '/obstacle_detector'}
-    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
     assert child.stop() == 0
     wait_for(lambda: not nodes_of(peer), 'the end of the program')
 
@@ -229,7 +229,7 @@ def test_the_patrol_drives_a_program_whose_description_a_command_prints(
 
     assert described[0].data == '<robot name="patrol_1"><link name="base_link"/></robot>\n'
     nodes = {f'/patrol_1/{name}' for name in ('patrol', 'odometer', 'base')}
-    wait_for(lambda: nodes_of(peer) == nodes, f'the nodes {nodes}')
+    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
     assert child.stop() == 0
 
 

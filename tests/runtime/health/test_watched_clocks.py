@@ -102,7 +102,7 @@ nodes:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     assert "health: nobody publishes '/clock'" in health()
-    publisher = peer.node.create_publisher(Clock, '/clock', 1)
+    publisher = peer.run(peer.node.create_publisher, Clock, '/clock', 1)
 
     def is_beating():
         seconds = peer.node.get_clock().now().nanoseconds * 1e-9

@@ -91,11 +91,19 @@ class Edited:
         return self.child.wait_for_line('reloaded in ', times=self._reloads)
 
 
-def test_edits_change_just_what_they_say(running, peer, wait_for):
+def count_of(peer):
+    """Return a list that grows by each number on `/count`."""
     counts = []
-    peer.node.create_subscription(
-        Int64, '/count', lambda message: counts.append(message.data), 1000
-    )
+
+    def count(message):
+        counts.append(message.data)
+
+    peer.run(peer.node.create_subscription, Int64, '/count', count, 1000)
+    return counts
+
+
+def test_edits_change_just_what_they_say(running, peer, wait_for):
+    counts = count_of(peer)
     wait_for(lambda: counts, 'a count')
 
     def gids():
@@ -278,10 +286,7 @@ def test_removed_nodes_stop(running):
 
 
 def test_values_set_live_stay(running, peer, wait_for):
-    counts = []
-    peer.node.create_subscription(
-        Int64, '/count', lambda message: counts.append(message.data), 1000
-    )
+    counts = count_of(peer)
     wait_for(lambda: counts, 'the first count')
     running.edit('{step: 1}', '{step: 10}')
     running.reloaded()
@@ -291,10 +296,7 @@ def test_values_set_live_stay(running, peer, wait_for):
 
 
 def test_values_come_and_go_in_parameter_files(running, peer, wait_for):
-    counts = []
-    peer.node.create_subscription(
-        Int64, '/count', lambda message: counts.append(message.data), 1000
-    )
+    counts = count_of(peer)
 
     def wait_for_steps(step):
         wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == step, f'steps of {step}')
