@@ -74,7 +74,8 @@ def failure(call):
 
 def play(node):
     callers[:] = [node, threading.get_ident()]
-    response = node.call('echo', {'float32_value': 0.1, 'string_value': 'x'}, LIMIT)
+    for _ in range(5):
+        response = node.call('echo', {'float32_value': 0.1, 'string_value': 'x'}, LIMIT)
     tell(node, 'values', response.float32_value, response.string_value)
     keep_apart(node)
     tell(node, 'relay', node.call('relay', {'string_value': 'y'}, LIMIT).string_value)
@@ -226,5 +227,6 @@ def test_calls_and_goals_are_the_same_handed_over_or_sent(compose, peer):
 
     unlimited, ways = play(compose, peer, local='true', limit=None)
     assert unlimited == sent
-    # The second is of a coroutine.
-    assert ways[:3] == ['here', 'handed', 'sent']
+    # Where the server's group is busy for a moment, it is handed over; then one is of a coroutine.
+    assert 'here' in ways[:5]
+    assert ways[5:7] == ['handed', 'sent']
