@@ -124,10 +124,8 @@ class _Reader:
         if node.name in _FOR_UNDEFINED:
             self._guarded.add(id(node.node))
         if node.name not in known:
-            text, advice = (
-                f"there is no {what} '{node.name}'",
-                suggest(node.name, known, 'there are'),
-            )
+            text = f"there is no {what} '{node.name}'"
+            advice = suggest(node.name, known, 'there are')
             self.findings.append(ExpressionFinding('bad-expression', text, node.name, advice))
 
     def _find_name(self, node: nodes.Name) -> FieldType | None:
