@@ -52,6 +52,9 @@ def hear(node, message):
 """
 
 
+_pages = []
+
+
 class Page:
     """A page that is served, and its cookie."""
 
@@ -63,6 +66,7 @@ class Page:
             text=True,
             env=environment,
         )
+        _pages.append(self)
         self.address = self.process.stderr.readline().strip()
         self.port = int(re.search(r':(\d+)/', self.address)[1])
         self.path = self.address.partition(str(self.port))[2]
@@ -102,10 +106,21 @@ class Page:
                 yield (json.loads(line[6:]) for line in answer if line.startswith(b'data: '))
 
     def end(self):
+        """Return the exit code."""
+        _pages.remove(self)
         self.process.send_signal(signal.SIGINT)
         with self.process as process:
             process.communicate(timeout=30)
         return process.returncode
+
+
+@pytest.fixture(autouse=True)
+def _ending():
+    """End the pages of a test that has failed."""
+    before = [*_pages]
+    yield
+    for each in [each for each in _pages if each not in before]:
+        each.end()
 
 
 @pytest.fixture(scope='module')
@@ -319,6 +334,20 @@ def find_all(browser, selector):
     return browser.find_elements('css selector', selector)
 
 
+def click(browser, selector):
+    """Click the first element as soon as there is one; lists are made anew all the time."""
+    from selenium.common import StaleElementReferenceException
+
+    def is_clicked():
+        with suppress(StaleElementReferenceException):
+            for element in find_all(browser, selector)[:1]:
+                element.click()
+                return True
+        return False
+
+    wait_for(is_clicked, selector)
+
+
 def read_text(browser, selector):
     return browser.execute_script(f'return document.querySelector("{selector}")?.innerText ?? ""')
 
@@ -479,7 +508,7 @@ def test_hostile_texts_stay_text(compose, browser, peer):
     answer = wait_for(lambda: page.json('/api/message?topic=/names').get('text'), 'a message')
     assert len(answer) <= 100_001
     browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fnames')
-    wait_for(lambda: find('#message button'), 'the topic')[0].click()
+    click(browser, '#message button')
     wait_for(lambda: '<img src=x' in contents('#message pre'), 'the message')
     find('#search')[0].send_keys('ear\n')
     wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the page to be usable')
@@ -615,7 +644,7 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     wait_for(lambda: 'subscription words of /ear' in text_of('#problems'), 'the problem')
     wait_for(lambda: find('main svg .node.hurts, main svg .node.warns'), 'the node that hurts')
     # A click on the problem leads to its node, and the keyboard to another one.
-    wait_for(lambda: find('#problems button'), 'the drawing')[0].click()
+    click(browser, '#problems button')
     wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the selection')
     assert browser.current_url.endswith('#node%3A%2Fear')
     wait_for(lambda: 'subscription words' in text_of('#live'), 'figures')
@@ -626,7 +655,7 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     assert 'parts:say' in text_of('#details pre')
     browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fleft%2Fwords')
     wait_for(lambda: find('#message button'), 'the topic')
-    find('#message button')[0].click()
+    click(browser, '#message button')
     wait_for(lambda: EVIL in text_of('#message pre'), 'a message')
     # Where it may, it changes values, and does what a saved edit would.
     browser.get(acting.address)
@@ -639,12 +668,12 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     assert 'def say(node)' in text_of('#details')
     assert find('#details a')[0].get_attribute('href').startswith('vscode://file/')
     browser.get(f'http://127.0.0.1:{acting.port}/#service%3A%2Fleft%2Fswitch')
-    wait_for(lambda: find('#acts form button'), 'the service')[0].click()
+    click(browser, '#acts form button')
     wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
     text = (shared_compose.folder / 'system.yaml').read_text()
     (shared_compose.folder / 'system.yaml').write_text(re.sub(r'rate: \d+', 'rate: 8', text))
     wait_for(lambda: 'period' in text_of('#plan'), 'the plan')
-    find('#reload')[0].click()
+    click(browser, '#reload')
     wait_for(lambda: '~1 timer' in text_of('#last'), 'the reload')
     # All can use it, in light and dark; what is not chosen is dim in the drawing.
     for rest in ([['main svg']], []):
