@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -173,6 +174,8 @@ class WatchedSystem:
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
+        # What is asked, as a reload, may take long: what is watched stays fresh meanwhile.
+        self._answerer = threading.Thread(target=self._answer, name='composer-asks', daemon=True)
 
     def start(self) -> None:
         """Begin to ask."""
@@ -182,15 +185,19 @@ class WatchedSystem:
         """Ask no more."""
         self._ended.set()
         self._thread.join(STATUS_SEC)
+        if self._answerer.ident is not None:
+            self._answerer.join(STATUS_SEC)
 
     def ask(self, question: Callable[[Any], Any], future: Future[Any]) -> None:
-        """Have the thread that watches call a function with its client, and fill a future."""
+        """Have a thread call a function with a client, and fill a future."""
         self._questions.put((question, future))
 
     def _run(self) -> None:
         try:
             with Client() as client:
                 self._hear_log(client)
+                # ROS starts in one thread after the other.
+                self._answerer.start()
                 while not self._ended.is_set():
                     self._watch(client)
         except Exception as error:  # noqa: BLE001 - the page shows it
@@ -310,17 +317,19 @@ class WatchedSystem:
         self.log.append(line)
 
     def _spin(self, client: Client, until: float) -> None:
-        """Hear what comes, and answer questions, for a while."""
+        """Hear what comes for a while."""
         while monotonic() < until and not self._ended.is_set():
             client.executor.spin_once(timeout_sec=_POLL_SEC)
-            try:
-                question, future = self._questions.get_nowait()
-            except Empty:
-                continue
-            try:
-                future.set_result(question(client))
-            except Exception as error:  # noqa: BLE001 - it is told to who asked
-                future.set_exception(error)
+
+    def _answer(self) -> None:
+        with Client() as client:
+            while not self._ended.is_set():
+                with suppress(Empty):
+                    question, future = self._questions.get(timeout=_POLL_SEC)
+                    try:
+                        future.set_result(question(client))
+                    except Exception as error:  # noqa: BLE001 - it is told to who asked
+                        future.set_exception(error)
 
     def _tell(self, state: dict[str, Any]) -> None:
         self.state = state
