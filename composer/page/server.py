@@ -12,7 +12,7 @@ import sys
 from concurrent.futures import Future
 from contextlib import suppress
 from importlib import resources
-from time import time
+from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
@@ -48,6 +48,8 @@ _MOST_STREAMS = 16
 # A browser that does not read so long is dropped.
 _SEND_SEC = 10.0
 _KEEP_ALIVE_SEC = 15.0
+# Who has asked so recently looks at the answer.
+_LOOK_SEC = 5.0
 # States come no faster than they can be looked at.
 _SHORTEST_PAUSE_SEC = 0.25
 _ANSWER_SEC = 12.0
@@ -92,7 +94,7 @@ class PageServer:
         self._source = source
         self._secret = secrets.token_urlsafe(32)
         self._settings = {'allows_changes': allows_changes, 'editor': editor}
-        self._streams = 0
+        self._streams, self._asked = 0, monotonic()
         self._wakers: set[asyncio.Event] = set()
         self._socket = socket.socket()
         try:
@@ -139,8 +141,11 @@ class PageServer:
             with suppress(RuntimeError):  # The loop has ended.
                 loop.call_soon_threadsafe(wake)
 
-        self._source.changed = tell
+        self._source.changed, self._source.is_looked_at = tell, self._is_looked_at
         await server.serve(sockets=[self._socket])
+
+    def _is_looked_at(self) -> bool:
+        return self._streams > 0 or monotonic() < self._asked + _LOOK_SEC
 
     def _routes(self) -> Application:
         from starlette.applications import Starlette
@@ -169,6 +174,7 @@ class PageServer:
             if scope['type'] != 'http':
                 return
             request = Request(scope)
+            self._asked = monotonic()
 
             async def send_guarded(message: Scope) -> None:
                 if message['type'] == 'http.response.start':

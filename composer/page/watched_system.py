@@ -38,6 +38,8 @@ _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
 _STATUS_PERIOD_SEC = 2.0
 _POLL_SEC = 0.1
+# While nobody looks, the system is asked as seldom.
+_IDLE_SEC = 10.0
 _MOST_FOLDED = 16
 _MOST_LINES = 500
 _LONGEST_LINE = 2000
@@ -128,6 +130,7 @@ class DrawnFiles:
         state: What the page shows, but for the drawing.
         drawing: Of its files; `None` if they cannot be drawn.
         changed: Called after each change of one of them.
+        is_looked_at: Returns whether somebody looks.
     """
 
     def __init__(
@@ -138,6 +141,7 @@ class DrawnFiles:
         self.state: dict[str, Any] = {'name': name, 'runs': False, 'drawing': 1}
         self.log: deque[dict[str, Any]] = deque()
         self.system = None
+        self.is_looked_at: Callable[[], bool] = lambda: True
         self.changed: Callable[[], object] = lambda: None
 
     def start(self) -> None:
@@ -165,6 +169,7 @@ class WatchedSystem:
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
         self.system: RunningSystem | None = None
         self._saved = SavedFiles()
+        self.is_looked_at: Callable[[], bool] = lambda: True
         self.changed: Callable[[], object] = lambda: None
         self._lines = 0
         self._rows: list[dict[str, Any]] = []
@@ -254,6 +259,9 @@ class WatchedSystem:
             )
             # A silent worker takes a second of the pause: the others do not seem old for it.
             self._spin(client, max(begun + found['period_sec'] / 2, monotonic() + _POLL_SEC))
+            idle_until = monotonic() + _IDLE_SEC
+            while not self.is_looked_at() and monotonic() < idle_until:
+                self._spin(client, monotonic() + _POLL_SEC)
 
     def _note_heard(self, said: dict[str, Any], found: dict[str, Any]) -> None:
         """Add to each entity when it was `heard`; those of a silent worker stay as they were."""
