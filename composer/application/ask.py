@@ -1,4 +1,4 @@
-"""Commands to running systems: reload, restart a node, stop."""
+"""Commands to running systems: reload; restart, stop or start a node; stop."""
 
 from __future__ import annotations
 
@@ -39,13 +39,16 @@ def reload(
         return system.name, client.ask(system, command, timeout_sec)
 
 
-def restart(node: str, timeout_sec: float = 60.0) -> tuple[str, Outcome]:
+def restart(
+    node: str, timeout_sec: float = 60.0, *, action: str = 'restart'
+) -> tuple[str, Outcome]:
     """Let a system build a node or start an external process anew.
 
     Args:
         node: The full name, or what follows the last slash of it if that tells it; or the name
             of an external process.
         timeout_sec: How long the system may take to answer.
+        action: Or `stop` a node, or `start` one that was stopped.
 
     Returns:
         The system's name, and what came of it.
@@ -56,7 +59,7 @@ def restart(node: str, timeout_sec: float = 60.0) -> tuple[str, Outcome]:
     """
     with Client() as client:
         system, full_name = _find_node(Discovery(client).find_all(), node)
-        return system.name, client.restart(system, full_name, timeout_sec)
+        return system.name, client.restart(system, full_name, timeout_sec, action)
 
 
 def down(name: str | None = None, timeout_sec: float = 60.0) -> str:
@@ -108,7 +111,7 @@ def _find_node(systems: Sequence[RunningSystem], name: str) -> tuple[RunningSyst
     nodes = [
         (system, node)
         for system in systems
-        for key in ('nodes', 'components')
+        for key in ('nodes', 'components', 'stopped')
         for node in (system.status or {}).get(key, ())
     ]
     nodes += [

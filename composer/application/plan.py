@@ -122,7 +122,9 @@ def plan_from(
 def _compare_running(running: str, context: CheckContext) -> Plan:
     prefixes = decode_snapshot(read_answer(running)).prefixes
     new = take_snapshot(context, [Path(each) for each in prefixes])
-    return compare(*conceal_both(running, new))
+    # What somebody has stopped stays so.
+    stopped = read_answer(running, SNAPSHOT)['given']['stopped']
+    return compare(*conceal_both(running, new.without(stopped)))
 
 
 def _ask_running(spec: SystemSpec, host: str) -> str | ComposerError:

@@ -79,14 +79,20 @@ class Reloader:
         self._aborts_goals = threading.Event()
         self._told = ToldFindings(told)
         self._next_look = 0.0
+        # What runs, with the nodes that somebody has stopped.
+        self._context = replace(context)
+        self._whole: Snapshot | None = None
+        self._stopped: frozenset[str] = frozenset()
+        self._sends_big = False
 
     @property
     def given(self) -> dict[str, list[str]]:
-        """The layers, arguments and settings that the system was started with."""
+        """See `Commands`."""
         return {
             'layers': [str(self._folder / each) for each in self._reader.paths[1:]],
             'words': [conceal(each) for each in self._reader.words],
             'set_values': [conceal(each) for each in self._reader.set_values],
+            'stopped': sorted(self._stopped),
         }
 
     def reload(self, system: System) -> Outcome:
@@ -148,13 +154,46 @@ class Reloader:
         finally:
             self._aborts_goals.clear()
 
+    def switch(self, system: System, node: str, *, runs: bool) -> Outcome:
+        """Stop a node, or start one that was stopped, as the files said when they were read last.
+
+        Goals of its actions are aborted.
+
+        Args:
+            node: Its full name.
+        """
+        from composer.runtime.logs import system_logger
+
+        with self._lock, system.state.reloading():
+            whole = self._whole or system.snapshot
+            failure = self._why_no_switch(whole, node, runs=runs)
+            if failure:
+                return Outcome(succeeded=False, text=failure)
+            before = self._stopped
+            self._stopped = before - {node} if runs else before | {node}
+            try:
+                self._apply(system, [], self._context, whole)
+            except ComposerError as error:
+                self._stopped = before
+                return Outcome(succeeded=False, text=conceal(str(error)))
+            text = f"node '{node}' was {'started' if runs else 'stopped'}"
+            system_logger.warning(text)
+        return Outcome(succeeded=True, text=text)
+
+    def _why_no_switch(self, whole: Snapshot, node: str, *, runs: bool) -> str:
+        if node not in {each.full_name for each in whole.spec.nodes.values()}:
+            return f"'{node}' is no node of Composer's: only these are stopped and started"
+        if runs != (node in self._stopped):
+            return f"node '{node}' {'runs' if runs else 'is stopped'} already"
+        return ''
+
     def plan(self, system: System) -> Outcome:
         """Read the files, and tell what `reload` would do."""
         findings: list[Diagnostic] = []
         with self._lock:
             try:
                 context = self._check(findings)
-                new = take_snapshot(context, self._prefixes)
+                new = take_snapshot(context, self._prefixes).without(self._stopped)
             except ComposerError as error:
                 return Outcome(succeeded=False, text=with_findings(findings, conceal(str(error))))
             # Who asks may be anybody on the ROS graph.
@@ -180,9 +219,6 @@ class Reloader:
     def _become(
         self, system: System, findings: list[Diagnostic], is_whole: Callable[[], bool]
     ) -> Plan:
-        from composer.runtime.rewiring.fresh_modules import fresh_modules
-        from composer.runtime.rewiring.patience import import_with_patience
-
         context = self._check(findings)
         snapshot = take_snapshot(context, self._prefixes)
         self._files.also_follow(list_files(context))
@@ -193,6 +229,31 @@ class Reloader:
         if snapshot.definitions != system.snapshot.definitions:
             self._add_packages(context)
             snapshot = take_snapshot(context, self._prefixes)
+        self._sends_big = any(each.rule == 'big-crossing-message' for each in findings)
+        plan = self._apply(system, findings, context, snapshot, is_whole)
+        self._files.follow([*self._paths, *list_files(context)])
+        return plan
+
+    def _apply(
+        self,
+        system: System,
+        findings: list[Diagnostic],
+        context: CheckContext,
+        whole: Snapshot,
+        is_whole: Callable[[], bool] | None = None,
+    ) -> Plan:
+        """Import the behaviours of a system, and become it, but for the stopped nodes.
+
+        Args:
+            is_whole: See `_reload`; `None` if the files were not read: newer ones are no matter
+                then, and goals of actions that go are aborted.
+        """
+        from composer.runtime.rewiring.fresh_modules import fresh_modules
+        from composer.runtime.rewiring.patience import import_with_patience
+
+        aborts_goals = self._aborts_goals.is_set if is_whole else lambda: True
+        is_outdated = self._is_outdated if is_whole else lambda: False
+        snapshot = whole.without(self._stopped)
         stale = snapshot.stale_modules(system.snapshot)
         search_path = project_search_path(context.system.files)
         workers = system.workers
@@ -200,8 +261,7 @@ class Reloader:
             fresh_modules(stale, snapshot.sources, search_path) as import_rest,
             workers.importing(),
         ):
-            crossing = {each.rule for each in findings}
-            workers.give_room(snapshot.spec, sends_big='big-crossing-message' in crossing)
+            workers.give_room(snapshot.spec, sends_big=self._sends_big)
             workers.spawn(snapshot.spec)
 
             def import_all() -> Reading | None:
@@ -212,16 +272,19 @@ class Reloader:
 
             reading = import_with_patience(
                 import_all,
-                lambda: system.stop_requested or self._is_outdated(),
+                lambda: system.stop_requested or is_outdated(),
             )
             if reading is None:
                 raise ComposerError(_RUNS_ON)
-            if _loses_parts(system.snapshot, snapshot) and not is_whole():
+            if is_whole and _loses_parts(system.snapshot, snapshot) and not is_whole():
                 raise _HalfWrittenError
-            plan = system.rewire(reading, self._aborts_goals.is_set, self._is_outdated)
+            plan = system.rewire(reading, aborts_goals, is_outdated)
             if system.stop_requested:
                 raise ComposerError(_STOPS)
-        self._files.follow([*self._paths, *list_files(context)])
+        # A node that has left the files is not stopped if it comes back.
+        self._stopped &= {each.full_name for each in whole.spec.nodes.values()}
+        self._context, self._whole = replace(context), whole
+        system.state.stopped = sorted(self._stopped)
         return plan
 
     def _add_packages(self, context: CheckContext) -> None:

@@ -26,8 +26,8 @@ from composer.errors import ExitCode
 _SUBCOMMAND = 'COMMAND [ARGS]...'
 # What ros2 and other tools call them.
 _OTHER_COMMANDS = {
-    **dict.fromkeys(('launch', 'run', 'start'), 'up'),
-    **dict.fromkeys(('kill', 'stop'), 'down'),
+    **dict.fromkeys(('launch', 'run'), 'up'),
+    'kill': 'down',
     **dict.fromkeys(('lint', 'validate'), 'check'),
     'init': 'new',
     'play': 'replay',

@@ -13,6 +13,7 @@ from composer.runtime.messages.payload_texts import read_parameter, read_payload
 
 if TYPE_CHECKING:
     from composer.application.running_systems.client import Client, RunningSystem
+    from composer.page.recording import Recording
 
 _ANSWER_SEC = 3.0
 _RELOAD_SEC = 60.0
@@ -95,26 +96,31 @@ def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
     return {'text': render_yaml(data) if data else '', 'type': type_name}
 
 
-def act(client: Client, system: RunningSystem, wish: dict[str, str]) -> dict[str, Any]:
+def act(
+    client: Client, system: RunningSystem, wish: dict[str, str], recording: Recording
+) -> dict[str, Any]:
     """Do what somebody wants, and return what came of it, as `text`.
 
     Args:
-        wish: `action`: `reload`, `restart`, `set`, `call` or `publish`; `name`: of a node, a
-            service or a topic; `parameter`; `text`: a value or a payload, in YAML.
+        wish: `action`: `reload`, `restart`, `stop`, `start`, `set`, `call`, `publish`, `record` or
+            `end_record`; `name`: of a node, a service or a topic; `parameter`; `text`: a value or
+            a payload, in YAML.
 
     Raises:
         ComposerError: It cannot be done, or what is wanted does not fit.
     """
     action, name, text = (wish.get(key, '') for key in ('action', 'name', 'text'))
-    if action in ('reload', 'restart'):
+    if action in ('reload', 'restart', 'stop', 'start'):
         outcome = (
             client.ask(system, protocol.RELOAD, _RELOAD_SEC)
             if action == 'reload'
-            else client.restart(system, name, _RELOAD_SEC)
+            else client.restart(system, name, _RELOAD_SEC, action)
         )
         if not outcome.succeeded:
             raise ComposerError(outcome.text)
         return {'text': outcome.text or 'nothing has changed'}
+    if action in ('record', 'end_record'):
+        return {'text': recording.begin(client) if action == 'record' else recording.end()}
     done = {'set': _set, 'call': _call_service, 'publish': _publish}.get(action)
     if done is None:
         message = f"there is no action '{action}'"

@@ -476,6 +476,7 @@ function levelsOfNodes() {
   for (const [node, lifecycle] of Object.entries(state.status?.lifecycles ?? {})) {
     if (lifecycle !== 'active') levels.set(node, worse('warn', levels.get(node) ?? 'ok'));
   }
+  for (const node of state.status?.stopped ?? []) levels.set(node, 'warn');
   return levels;
 }
 
@@ -588,8 +589,8 @@ function showProblems() {
 
 function showTree() {
   const levels = levelsOfNodes();
-  const {nodes: running, lifecycles} = state.status ?? {};
-  const shown = JSON.stringify([drawn, [...levels].sort(), running, lifecycles, parts.size, state.outside]);
+  const {nodes: running, lifecycles, stopped} = state.status ?? {};
+  const shown = JSON.stringify([drawn, [...levels].sort(), running, lifecycles, stopped, parts.size, state.outside]);
   if (byId('tree').dataset.shown === shown) return;
   byId('tree').dataset.shown = shown;
   const drawnNodes = [...parts.values()].filter((part) => part.id.startsWith('node:'))
@@ -610,7 +611,7 @@ function showTree() {
     fold.append(make('summary', `${space} (${members.length})`, worst));
     const list = make('ul');
     for (const node of members) {
-      const lifecycle = state.status?.lifecycles?.[node];
+      const lifecycle = state.status?.stopped?.includes(node) ? 'stopped' : state.status?.lifecycles?.[node];
       const text = node.slice(node.lastIndexOf('/') + 1) + (lifecycle ? ` (${lifecycle})` : '');
       const token = tokens.get(`node:${node}`);
       const item = token ? makeLink(token, text) : make('li', text);
@@ -774,14 +775,21 @@ function makeForm(label, text, wish, verb) {
 
 async function offerActs() {
   const section = byId('acts');
+  const focused = [...section.querySelectorAll('button')].indexOf(document.activeElement);
   section.replaceChildren();
   const part = parts.get(chosen);
   if (!state.allows_changes || !state.runs || !part) return;
   if (part.kind === 'node') {
     const told = make('p');
     told.setAttribute('role', 'status');
-    const wish = {action: 'restart', name: part.id.slice(5)};
-    section.append(makeButton('Restart the node', wish, told), told);
+    const name = part.id.slice(5);
+    const verbs = state.status?.stopped?.includes(name) ? ['Start'] : ['Restart', 'Stop'];
+    for (const verb of verbs) {
+      section.append(makeButton(`${verb} the node`, {action: verb.toLowerCase(), name}, told), ' ');
+    }
+    section.append(told);
+    const buttons = section.querySelectorAll('button');
+    if (focused >= 0) buttons[Math.min(focused, buttons.length - 1)].focus();
   } else if (part.kind === 'topic' || part.kind === 'service') {
     const [verb, action] = part.kind === 'topic' ? ['Publish once', 'publish'] : ['Call', 'call'];
     const asked = chosen;
@@ -813,6 +821,15 @@ function showPlans() {
     ? `Last reload, ${clock(last.time)}: ${last.message || (last.succeeded ? 'done' : 'failed')}` : '';
 }
 byId('reload').addEventListener('click', () => act({action: 'reload'}, byId('told')));
+
+function showRecording() {
+  const {target = '', told = ''} = state.recording ?? {};
+  byId('recording').hidden = !(state.allows_changes && state.runs);
+  byId('record').textContent = target ? 'End the recording' : 'Record';
+  byId('recorded').textContent = clean(target || told);
+}
+byId('record').addEventListener('click', () => act(
+  {action: state.recording.target ? 'end_record' : 'record'}, byId('recorded')));
 
 // Messages of the chosen topic, one a second, from when somebody asks for them until he pauses.
 function offerMessage() {
@@ -882,6 +899,7 @@ function showSummary() {
 }
 
 function take(next) {
+  const stopped = String(state.status?.stopped);
   state = next;
   ahead = Date.now() / 1000 - state.time;
   for (const row of rows()) {
@@ -896,6 +914,8 @@ function take(next) {
   showSummary();
   showProblems();
   showPlans();
+  showRecording();
+  if (stopped !== String(state.status?.stopped)) offerActs();
   showTree();
   showLive();
   stampParts();

@@ -24,6 +24,8 @@ def _problem(level: str, text: str, node: str = '') -> dict[str, str]:
 def _of_status(status: dict[str, Any]) -> Iterator[dict[str, str]]:
     if status.get('last_error'):
         yield _problem('error', f'the last reload failed: {status["last_error"]}')
+    for node in status.get('stopped', ()):
+        yield _problem('warn', f'{node} was stopped', node)
     for node, state in status.get('lifecycles', {}).items():
         if state != 'active':
             yield _problem('warn', f'{node} is {state}, and not active', node)

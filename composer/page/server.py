@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError
 from composer.page.looks import act, list_parameters, look_at_message, show_template
+from composer.page.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, MutableMapping
@@ -94,6 +95,7 @@ class PageServer:
         self._source = source
         self._secret = secrets.token_urlsafe(32)
         self._settings = {'allows_changes': allows_changes, 'editor': editor}
+        self._recording = Recording()
         self._streams, self._asked = 0, monotonic()
         self._wakers: set[asyncio.Event] = set()
         self._socket = socket.socket()
@@ -128,6 +130,8 @@ class PageServer:
         try:
             asyncio.run(self._serve(server))
         finally:
+            if self._recording.target:
+                self._recording.end()
             self._source.stop()
 
     async def _serve(self, server: Any) -> None:
@@ -237,7 +241,8 @@ class PageServer:
         return _json(self._shown(), longest=_LONGEST_WORDS)
 
     def _shown(self) -> dict[str, Any]:
-        return {**self._source.state, **self._settings, 'time': time()}
+        recording = {'target': self._recording.target, 'told': self._recording.told}
+        return {**self._source.state, **self._settings, 'recording': recording, 'time': time()}
 
     async def _drawing(self, request: Request) -> Response:
         drawing = self._source.drawing
@@ -282,7 +287,7 @@ class PageServer:
         system = self._source.system
         if system is None:
             return _json({'problem': 'the system does not run'}, 504)
-        return await self._ask(lambda client: act(client, system, wish), _ACT_SEC)
+        return await self._ask(lambda client: act(client, system, wish, self._recording), _ACT_SEC)
 
     async def _ask(
         self, question: Callable[[Client], Any], timeout_sec: float = _ANSWER_SEC

@@ -233,7 +233,7 @@ class WatchedSystem:
                 before = said
                 said = answer_forms.read_answer(status(STATUS_SEC).text, answer_forms.STATUS)
                 said |= {'heard': time(), 'period_sec': _STATUS_PERIOD_SEC}
-                if before and before['last_reload'] != said['last_reload']:
+                if before and any(before[key] != said[key] for key in ('last_reload', 'stopped')):
                     self._draw(client, system)
                 self._find_outside(client, said)
             self._saved.look()

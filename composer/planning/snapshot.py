@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -48,6 +48,11 @@ class Snapshot:
     read_at_start: Collection[Span] = frozenset()
     hidden: Mapping[str, str] = field(default_factory=dict)
     classes: Mapping[str, str] = field(default_factory=dict)
+
+    def without(self, nodes: Collection[str]) -> Snapshot:
+        """Return it without the nodes of these full names."""
+        kept = {key: each for key, each in self.spec.nodes.items() if each.full_name not in nodes}
+        return replace(self, spec=replace(self.spec, nodes=kept)) if nodes else self
 
     def is_read_at_start(self, path: DataPath) -> bool:
         """Return whether the value at a path is read when the system starts."""

@@ -343,8 +343,9 @@ print(code, *({'asyncio', 'jinja2', 'jsonschema', 'rclpy', 'statistics'} & {*sys
 
 PYTHON = 'def generate_launch_description():\n    return LaunchDescription([])\n'
 HABITS = [
-    *((f'{word} FILE', "Did you mean 'up'?") for word in ('launch', 'run', 'start')),
-    ('stop FILE', "Did you mean 'down'?"),
+    *((f'{word} FILE', "Did you mean 'up'?") for word in ('launch', 'run')),
+    ('kill FILE', "Did you mean 'down'?"),
+    ('start r.yaml', "help: 'composer up r.yaml' runs its system"),
     ('import FILE --force', "no such option '--force'"),
     ('import x.launch.py sim=true', 'help: write sim:=true'),
     ('up FILE sim=true', "write 'sim:=true'"),

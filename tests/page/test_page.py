@@ -58,12 +58,13 @@ _pages = []
 class Page:
     """A page that is served, and its cookie."""
 
-    def __init__(self, domain_id, *words):
+    def __init__(self, domain_id, *words, folder=None):
         environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'composer', 'page', '--no-browser', *words],
             stderr=subprocess.PIPE,
             text=True,
+            cwd=folder,
             env=environment,
         )
         _pages.append(self)
@@ -136,7 +137,8 @@ def page(shared_compose):
 
 @pytest.fixture(scope='module')
 def acting(page, shared_compose):
-    acting = Page(shared_compose.domain_id, 'system', '--allow-changes')
+    options = ('system', '--allow-changes')
+    acting = Page(shared_compose.domain_id, *options, folder=shared_compose.folder)
     wait_for(lambda: acting.json('/api/state').get('health'), 'the system to answer')
     yield acting
     assert acting.end() == 130
@@ -149,6 +151,8 @@ def acting(page, shared_compose):
         ({'action': 'call', 'name': '/left/switch', 'text': '{data: true}'}, 'success: true'),
         ({'action': 'publish', 'name': '/left/words', 'text': 'hello'}, 'to 1 subscription'),
         ({'action': 'restart', 'name': '/left/talker'}, "node '/left/talker' was restarted"),
+        ({'action': 'stop', 'name': '/left/talker'}, "node '/left/talker' was stopped"),
+        ({'action': 'start', 'name': '/left/talker'}, "node '/left/talker' was started"),
     ],
 )
 def test_it_changes_what_it_may(acting, wish, told):
@@ -168,6 +172,9 @@ def test_it_changes_what_it_may(acting, wish, told):
         ({'action': 'call', 'name': '/left/switch', 'text': '{dta: true}'}, 504, "'dta'"),
         ({'action': 'call', 'name': '/left/switch', 'text': '{data: '}, 504, 'is no YAML'),
         ({'action': 'publish', 'name': '/nothing', 'text': ''}, 504, "no topic '/nothing'"),
+        ({'action': 'stop', 'name': '/nobody'}, 504, "'/nobody' is no node"),
+        ({'action': 'start', 'name': '/left/talker'}, 504, 'runs already'),
+        ({'action': 'end_record'}, 504, 'nothing is recorded'),
         ({'action': 'leave'}, 504, "no action 'leave'"),
         ({'action': 3}, 400, 'mapping of texts'),
         ('[', 400, 'mapping of texts'),
@@ -195,6 +202,16 @@ def test_others_change_nothing(acting, page, headers):
     wish = {'action': 'restart', 'name': '/left/talker'}
     assert acting.act(wish, **headers)[0] == 403
     assert page.act(wish)[0] == 403
+
+
+def test_it_records(acting):
+    acting.act({'action': 'record'})
+    target = Path(acting.json('/api/state')['recording']['target'])
+    assert 'already' in acting.act({'action': 'record'})[1]['problem']
+    wait_for(lambda: any(target.glob('*.mcap')), 'the file')
+    assert 'recorded' in acting.act({'action': 'end_record'})[1]['text']
+    assert (target / 'metadata.yaml').is_file()
+    assert acting.json('/api/state')['recording']['target'] == ''
 
 
 def test_what_a_saved_edit_would_do_is_shown_before_it_is_done(acting, shared_compose):
@@ -233,7 +250,7 @@ def test_the_state_says_what_is_wrong_and_where(page):
     assert problems[0]['node'] == '/ear'
     assert 'subscription words of /ear' in problems[0]['text']
     state = page.json('/api/state')
-    assert (state['runs'], state['status']['nodes']) == (True, ['/left/talker', '/ear'])
+    assert (state['runs'], sorted(state['status']['nodes'])) == (True, ['/ear', '/left/talker'])
     assert {row['node'] for row in state['health']['entities']} == {'/left/talker', '/ear'}
 
 
@@ -684,3 +701,28 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
         browser.find_element('css selector', 'body').send_keys(Keys.ESCAPE)
     assert not find('img')
     assert [each for each in browser.get_log('browser') if each['level'] == 'SEVERE'] == []
+
+
+def test_a_browser_stops_and_starts_a_node_and_records(acting, browser):
+    """By keyboard: the focus is kept where one button takes the place of another."""
+    from selenium.webdriver import ActionChains, Keys
+
+    text_of = partial(read_text, browser)
+    browser.get(acting.address)
+    browser.get(f'http://127.0.0.1:{acting.port}/#node%3A%2Fleft%2Ftalker')
+    for verb, then in (('Stop', 'Start'), ('Start', 'Restart')):
+        script = (
+            "const found = [...document.querySelectorAll('#acts button')]"
+            '.find((each) => each.innerText.startsWith(arguments[0])); found?.focus(); return found'
+        )
+        wait_for(lambda: browser.execute_script(script, verb), verb)  # noqa: B023
+        ActionChains(browser).send_keys(Keys.ENTER).perform()
+        focus = 'return document.activeElement.innerText'
+        wait_for(lambda: browser.execute_script(focus) == f'{then} the node', then)  # noqa: B023
+        stopped = 'talker was stopped' in text_of('#problems')
+        assert stopped is (verb == 'Stop')
+        assert ('talker (stopped)' in text_of('#tree')) is stopped
+    click(browser, '#record')
+    wait_for(lambda: text_of('#record') == 'End the recording', 'the recording')
+    click(browser, '#record')
+    wait_for(lambda: 'recorded' in text_of('#recorded'), 'its end')

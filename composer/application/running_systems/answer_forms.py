@@ -20,13 +20,15 @@ _EXTERNAL: Final[Form] = {
     'restarts': int,
     **dict.fromkeys(('pid', 'cpu', 'memory_bytes'), _FIGURE),
 }
-SNAPSHOT: Final[Form] = {'given': {key: [str] for key in ('layers', 'words', 'set_values')}}
+_GIVEN = ('layers', 'words', 'set_values', 'stopped')
+SNAPSHOT: Final[Form] = {'given': {key: [str] for key in _GIVEN}}
 STATUS: Final[Form] = {
     **dict.fromkeys(('name', 'file', 'host', 'state', 'last_error'), str),
     'pid': int,
     'uptime_sec': float,
     'nodes': [str],
     'components': [str],
+    'stopped': [str],
     'lifecycles': {str: str},
     'external_processes': [_EXTERNAL],
     'workers': [{'name': str}],

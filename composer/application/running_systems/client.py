@@ -132,17 +132,25 @@ class Client:
 
             yield ask
 
-    def restart(self, system: RunningSystem, node: str, timeout_sec: float) -> Outcome:
+    def restart(
+        self, system: RunningSystem, node: str, timeout_sec: float, action: str = 'restart'
+    ) -> Outcome:
         """Let a system build a node anew; see `ask`.
 
         Args:
             node: The full name of the node.
+            action: Or `stop` or `start` it.
         """
         from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
         from rcl_interfaces.srv import SetParametersAtomically
 
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=node)
-        request = SetParametersAtomically.Request(parameters=[Parameter(name='node', value=value)])
+        kind = ParameterType.PARAMETER_STRING
+        request = SetParametersAtomically.Request(
+            parameters=[
+                Parameter(name=name, value=ParameterValue(type=kind, string_value=text))
+                for name, text in (('node', node), ('action', action))
+            ]
+        )
         with self._client(SetParametersAtomically, f'{system.node}/{protocol.RESTART}') as client:
             result = self._call(client, request, system, timeout_sec).result
             return Outcome(result.successful, result.reason)

@@ -1,4 +1,4 @@
-"""`composer reload`, `restart` and `down`: tell a running system what to do."""
+"""`composer reload`, `restart`, `stop`, `start` and `down`: tell a running system what to do."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def reload(name: str | None, timeout_sec: float, *, aborts_goals: bool) -> int:
     return _tell(*ask.reload(name, timeout_sec, aborts_goals=aborts_goals))
 
 
-def restart(node: str, timeout_sec: float) -> int:
-    """Build a node of a system anew; return the exit code."""
-    return _tell(*ask.restart(node, timeout_sec))
+def restart(node: str, timeout_sec: float, action: str) -> int:
+    """Restart, stop or start a node of a system; return the exit code."""
+    return _tell(*ask.restart(node, timeout_sec, action=action))
 
 
 def down(name: str | None, timeout_sec: float) -> int:

@@ -162,7 +162,39 @@ def restart_command(node: str, timeout_sec: float) -> int:
     """
     from composer.cli.running.commanding import restart
 
-    return restart(node, timeout_sec)
+    return restart(node, timeout_sec, 'restart')
+
+
+@click.command('stop')
+@click.argument('node')
+@_timeout
+def stop_command(node: str, timeout_sec: float) -> int:
+    """Stop a node, while the rest of its system runs.
+
+    It stays stopped, also when the system is reloaded, until 'composer start NODE', or until the
+    system itself starts again: 'composer down' stops that. NODE is its full name, or what follows
+    the last slash of it.
+    """
+    from composer.cli.running.commanding import restart
+
+    return restart(node, timeout_sec, 'stop')
+
+
+@click.command('start')
+@click.argument('node')
+@_timeout
+def start_command(node: str, timeout_sec: float) -> int:
+    """Start a node that 'composer stop' has stopped.
+
+    Its entities, parameters and state are as at the start again. NODE is its full name, or what
+    follows the last slash of it.
+    """
+    from composer.cli.running.commanding import restart
+
+    if node.endswith(('.yaml', '.yml')):
+        message = f"'{node}' is a file, and no node"
+        raise UsageError(message, help=f"'composer up {node}' runs its system")
+    return restart(node, timeout_sec, 'start')
 
 
 @click.command('down')
@@ -322,5 +354,7 @@ COMMANDS = (
     logs_command,
     reload_command,
     restart_command,
+    stop_command,
+    start_command,
     down_command,
 )

@@ -109,6 +109,7 @@ def _notes(system: RunningSystem) -> list[str]:
     told = {
         'health': (status['health'] or {}).get('message', ''),
         'last reload': status['last_error'],
+        'stopped': ', '.join(status['stopped']),
         'not active': ', '.join(
             f'{node} is {state}'
             for node, state in status['lifecycles'].items()

@@ -92,13 +92,16 @@ class Commands(Protocol):
 
     @property
     def given(self) -> dict[str, list[str]]:
-        """The layers, arguments and settings that it was started with."""
+        """The layers, arguments and settings that it was started with, and the stopped nodes."""
 
     def reload(self, system: Any) -> Outcome:
         """Read the files, and let the system become what they say."""
 
     def reload_now(self, system: Any) -> Outcome:
         """Do as `reload`, but abort goals that it would wait for, or that it waits for."""
+
+    def switch(self, system: Any, node: str, *, runs: bool) -> Outcome:
+        """Stop a node, or start one that was stopped."""
 
     def plan(self, system: Any) -> Outcome:
         """Read the files, and tell what `reload` would do."""
@@ -127,6 +130,7 @@ class ControlServices:
         from std_srvs.srv import Trigger
 
         self._system = system
+        self._commands = commands
         self._trace = ''
         self.answered = float('-inf')
         # What changes no node is served beside a reload, which may wait for a goal.
@@ -161,8 +165,8 @@ class ControlServices:
 
     def _serve_restart(self, request: Any, response: Any) -> Any:
         names = {each.name: each.value.string_value for each in request.parameters}
-        name = names.get('node', '')
-        outcome = _attempt(lambda: self._restart(name))
+        name, action = names.get('node', ''), names.get('action', 'restart')
+        outcome = _attempt(lambda: self._restart(name, action))
         response.result.successful, response.result.reason = outcome.succeeded, outcome.text
         return response
 
@@ -173,9 +177,14 @@ class ControlServices:
             return reload(self._system)
         return Outcome(succeeded=False, text=_STARTING)
 
-    def _restart(self, name: str) -> Outcome:
+    def _restart(self, name: str, action: str) -> Outcome:
+        if action in ('stop', 'start'):
+            return self._reload(partial(self._commands.switch, node=name, runs=action == 'start'))
         if not self._system.state.is_open:
             return Outcome(succeeded=False, text=_STARTING)
+        if name in self._system.state.stopped:
+            text = f"node '{name}' is stopped: composer start starts it"
+            return Outcome(succeeded=False, text=text)
         processes = [each['name'] for each in self._system.state.find_processes()]
         if name not in (*self._system.list_nodes(), *self._system.list_components(), *processes):
             return Outcome(succeeded=False, text=f"the system has no node or process '{name}'")

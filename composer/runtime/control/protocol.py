@@ -13,8 +13,9 @@ _LONGEST_NAME = 255
 _PREFIX = '_composer_'
 
 # The services of the control node, below its name. All are `std_srvs/srv/Trigger`, but `restart`,
-# which needs the name of a node: it is a `rcl_interfaces/srv/SetParametersAtomically` with the one
-# parameter `node`. None takes a path or code.
+# which needs the name of a node: it is a `rcl_interfaces/srv/SetParametersAtomically` with the
+# parameter `node`, and may have another one, `action`: `stop`, or `start` for a node that was
+# stopped. None takes a path or code.
 STATUS: Final = 'status'
 RELOAD: Final = 'reload'
 RELOAD_NOW: Final = 'reload_now'

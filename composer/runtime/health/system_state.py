@@ -56,6 +56,7 @@ class SystemState:
         last_reload: `None` before the first.
         find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
         find_processes: Returns the external processes, as `describe_processes` does.
+        stopped: The full names of the nodes that somebody has stopped.
         clock_problem: What keeps the clocks of nodes from going; empty if nothing does.
         clocks: Those of other hosts that have been compared, by the names of these.
     """
@@ -69,6 +70,7 @@ class SystemState:
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
         self.find_processes: Callable[[], list[dict[str, Any]]] = list
+        self.stopped: list[str] = []
         self.clock_problem = ''
         self.begun = time.monotonic()
         self._started = time.time()
@@ -126,6 +128,7 @@ class SystemState:
             'uptime_sec': self.uptime_sec,
             'log': find_log(),
             'last_error': self.last_error,
+            'stopped': self.stopped,
             'lifecycles': dict(self.find_lifecycles()),
             'external_processes': self.find_processes(),
             'last_reload': last

@@ -28,6 +28,7 @@ STATUS_ANSWER = {
     'last_error': '',
     'nodes': ['/a'],
     'components': ['/b'],
+    'stopped': [],
     'workers': [{'name': 'w'}],
     'lifecycles': {'/a': 'active'},
     'external_processes': [EXTERNAL],

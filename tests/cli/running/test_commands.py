@@ -144,7 +144,7 @@ def test_external_processes_are_listed_and_restarted(compose, composer, wait_for
     """One that has failed for good is no healthy system, until it is restarted."""
     busy = 'trap exit INT TERM; while :; do n=0; while [ $n -lt 9999 ]; do n=$((n+1)); done; sleep 0.1; done & wait'
     failing = 'while [ ! -e mended ]; do exit 3; done; sleep 3600'
-    text = SYSTEM + (
+    text = SYSTEM.replace('0.5', '20') + (
         'processes:\n'
         f'  busy: {{command: [sh, -c, "{busy}"]}}\n'
         f'  driver: {{command: [sh, -c, "{failing}"], restart: {{when: on_failure, max: 1}}}}\n'
@@ -179,7 +179,7 @@ def test_external_processes_are_listed_and_restarted(compose, composer, wait_for
     assert after['busy']['pid'] != processes['busy']['pid']
     assert health['level'] != 'error'
     assert 'arm, busy, driver, listed, stuck' in composer('restart', 'absent')[2]
-    assert child.stop() == 0
+    assert child.stop() == 0, child.output
 
 
 def test_several_systems_are_told_apart(compose, composer):
@@ -263,6 +263,7 @@ def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
         'last_reload': None,
         'health': None,
         'components': [],
+        'stopped': [],
         'lifecycles': {},
         'external_processes': [],
         'workers': [],
@@ -345,3 +346,47 @@ def test_a_goal_in_flight_is_waited_for_until_somebody_does_not_want_to(
     assert waiting.result().success
     peer.run(client.destroy)
     assert child.stop() == 0
+
+
+def test_nodes_stop_and_start(compose, composer, wait_for):
+    """What is stopped stays so through reloads; neither stop nor start takes a saved edit."""
+    text = (
+        SYSTEM.replace('0.5', '20').replace('threads: 1', 'threads: 2')
+        + '  far: {worker: other, namespace: robot, timers: {tick: {period: 0.05, behaviour: '
+        'parts:far}}, state: {count: 0}}\nworkers: {other: {}}\n'
+    )
+    code = CODE + '\ndef far(node):\n    node.logger.info("far")\n'
+    child = compose(text, code)
+    child.wait_until_ready()
+
+    def ask():
+        (system,) = json.loads(composer('ps', '--format', 'json')[1])['systems']
+        return system['nodes'], system['stopped']
+
+    def restarted():
+        return len(child.matching('count 1')), len(child.matching('[robot.far]: far'))
+
+    wait_for(lambda: all(restarted()), 'both')
+    assert composer('stop', 'arm') == (0, "system: node '/robot/arm' was stopped\n", '')
+    assert composer('stop', 'far')[0] == 0
+    assert ask() == (['/stuck'], ['/robot/arm', '/robot/far'])
+    assert "node '/robot/arm' is stopped already" in composer('stop', '/robot/arm')[2]
+    assert "node '/stuck' runs already" in composer('start', 'stuck')[2]
+    assert "node '/robot/arm' is stopped" in composer('restart', 'arm')[2]
+    assert 'stopped: /robot/arm, /robot/far' in composer('ps')[1]
+
+    file = compose.folder / 'system.yaml'
+    file.write_text(
+        text.replace('period: 0.05', 'period: 0.04').replace('count: 0', 'count: 1000')
+    )
+    assert composer('plan', str(file))[1] == 'system: no difference\n'
+    begun = restarted()
+    assert composer('start', 'far')[0] == 0
+    wait_for(lambda: restarted()[1] > begun[1], 'the node of the worker')
+    assert composer('reload')[0] == 0
+    assert ask()[1] == ['/robot/arm']
+    assert restarted()[0] == begun[0]
+    assert composer('start', 'arm')[0] == 0
+    assert ask()[1] == []
+    child.wait_for_line('count 1001')
+    assert child.stop() == 0, child.output

@@ -77,7 +77,7 @@ def give_up_plain(node, goal):
 def interrupted(node, goal):
     try:
         while True:
-            yield
+            yield [goal.order]
             time.sleep(0.01)
     except GeneratorExit:
         return [goal.order, 8]
@@ -311,9 +311,12 @@ def test_a_planned_abort_has_a_result_and_is_no_error(child, shared_connect, nam
     assert not child.matching(f"action '{name}' (system.yaml")
 
 
-def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(shared_connect):
+def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(shared_connect, wait_for):
     client = shared_connect('interrupted')
-    handle = client.begin(4)
+    heard = []
+    handle = client.begin(4, heard)
+    # One that has not begun is never interrupted.
+    wait_for(lambda: heard, 'the begin')
     assert client.cancel(handle) == 1
     assert client.end(handle) == ('canceled', [4, 8])
 

@@ -149,7 +149,7 @@ def test_after_an_error_it_begins_again_and_health_tells(run, peer, compose):
     feed('a')
     child.wait_for_line('heard step 1')
     assert child.stop() == 0, child.output
-    assert child.matching('closed step 2')
+    assert len(child.matching('closed step ')) == 2
 
 
 @pytest.mark.parametrize('behaviour', ['parts:read', 'parts:steps'])

@@ -65,7 +65,7 @@ class Rig:
             node.logger.info('destroyed')
 
     def hear(self, node, message):
-        if self.number == 2:
+        if message.data == 'tick 2':
             raise ValueError('two')
         node.logger.info(f'rig heard {message.data}')
 
