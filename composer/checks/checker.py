@@ -6,12 +6,11 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.checks.behaviours.behaviour_arguments import check_compared_arguments, check_monitors
 from composer.checks.behaviours.behaviour_bodies import check_bodies
 from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
 from composer.checks.behaviours.blocked_groups import check_blocked_groups
-from composer.checks.behaviours.compared_arguments import check_compared_arguments
 from composer.checks.behaviours.missing_modules import check_missing_modules
-from composer.checks.behaviours.monitors import check_monitors
 from composer.checks.behaviours.transforms import check_transforms
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.behaviours.wrong_annotations import check_annotations

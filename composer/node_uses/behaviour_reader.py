@@ -6,17 +6,16 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
-from composer.node_uses.names import Names, is_of_project, own_nodes
+from composer.node_uses.names import Names, is_of_project
 from composer.node_uses.reading import Payload, Reading, missing_reading, unknown_reading
 from composer.node_uses.unread_code import Mentions, find_mentions
 from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
 from composer.node_uses.walk import TooLongError, Walk
 from composer.node_uses.wires import Wire, wire_of
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.local_names import list_arguments
 from composer.python_source.modules import FunctionSource, ModuleSource
-from composer.python_source.places import span_of
 from composer.python_source.return_values import ends_without_value, never_returns
+from composer.python_source.syntax import list_arguments, own_nodes, positional_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,7 +88,7 @@ class BehaviourReader:
         self._names.find_module(behaviour.module)
         function = self._function(module, binding)
         if function is None:
-            top = self._names.top(module)
+            top = module.top
             name = behaviour.class_name or behaviour.function
             is_missing = not (name in top.statements or top.is_open or top.is_dynamic)
             return missing_reading() if is_missing else unknown_reading()
@@ -124,9 +123,7 @@ class BehaviourReader:
         return Instance(of, ((parameters[0], Chain(('node',))),)) if parameters else Instance(of)
 
     def _given(self, function: Function, binding: Binding) -> dict[str, Value]:
-        arguments = function.definition.args
-        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
-        names = names[1:] if function.bound is not None else names
+        names = positional_names(function.definition)[1 if function.bound is not None else 0 :]
         second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
         values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
         return dict(zip(names, values, strict=False))
@@ -197,7 +194,7 @@ class _Results:
                 if self._wire.returned or self._wire.yielded:
                     self._walk.need(node, self._scope)
         if self._wire.is_unpublished and _is_made_there(value):
-            self._run.reading.unpublished.append(span_of(module, value))
+            self._run.reading.unpublished.append(module.span_of(value))
 
     def _is_endless(self, loop: ast.While) -> bool:
         """Return whether nothing else of the group runs once a loop has begun."""

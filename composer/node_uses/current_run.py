@@ -16,7 +16,6 @@ from composer.node_uses.reading import (
     StateUse,
 )
 from composer.node_uses.values import Texts
-from composer.python_source.places import span_of
 
 if TYPE_CHECKING:
     import ast
@@ -112,7 +111,7 @@ class Run:
         is_typo = (help_text or '').startswith('did you mean')
         is_doubtful = bool(self.doubts) and not is_typo
         if not (self.guards or self.broad_guards or is_doubtful):
-            problem = Problem(rule, message, span_of(module, node), help_text)
+            problem = Problem(rule, message, module.span_of(node), help_text)
             self.reading.problems.append(problem)
 
     def use(
@@ -134,7 +133,7 @@ class Run:
             use = NodeUse(
                 kind,
                 name,
-                span_of(module, node, name),
+                module.span_of(node, name),
                 is_optional,
                 has_default,
                 self.is_certain and is_one,
@@ -153,12 +152,12 @@ class Run:
     def use_state(self, name: str, module: ModuleSource, node: ast.expr) -> None:
         """Note that a name of `node.state` is read."""
         is_guarded = bool(self.guards or self.doubts or self.state_doubts)
-        use = StateUse(name, span_of(module, node, name), is_guarded)
+        use = StateUse(name, module.span_of(node, name), is_guarded)
         self.reading.state_read.append(use)
 
     def set_state(self, name: str, scope: Scope, node: ast.expr) -> None:
         """Note that a name of `node.state` is set."""
-        self.reading.state_set.setdefault(name, span_of(scope.module, node, name))
+        self.reading.state_set.setdefault(name, scope.module.span_of(node, name))
         self.fill(Awaited('', 'state', name), scope)
 
     def fill(self, what: Awaited, scope: Scope) -> None:

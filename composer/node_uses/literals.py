@@ -12,7 +12,6 @@ from composer.interfaces.field_values import check_length
 from composer.interfaces.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.node_uses.reading import Problem
-from composer.python_source.places import span_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -126,7 +125,7 @@ class _Payloads:
             return
         names = [each.name for each in description.fields]
         error = unknown_field(in_python(description.name), name, names)
-        place = span_of(self._module, key, name)
+        place = self._module.span_of(key, name)
         yield Problem('unknown-field', str(error), place, error.help)
 
     def field(
@@ -164,7 +163,7 @@ class _Payloads:
                 check_length(field.type, len(items))
             except FieldError as error:
                 text = format_field_error(description.name, (field.name,), str(error))
-                yield Problem(error.rule, text, span_of(self._module, value), error.help)
+                yield Problem(error.rule, text, self._module.span_of(value), error.help)
             return
         yield from self._literal(description, value, {field.name: data})
 
@@ -173,6 +172,6 @@ class _Payloads:
     ) -> Iterator[Problem]:
         data = literal_of(value) if data is value else data
         for finding in check_payload(description, data, self._types.catalogue):
-            place = span_of(self._module, value)
+            place = self._module.span_of(value)
             message = finding.message.replace(description.name, in_python(description.name))
             yield Problem(finding.rule, message, place, finding.help)

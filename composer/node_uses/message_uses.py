@@ -11,7 +11,6 @@ from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.message_types import in_python
 from composer.node_uses.literals import find_misfit
 from composer.node_uses.reading import Problem
-from composer.python_source.places import span_of
 from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def check_message_uses(
         elif use.is_write and wire.is_read_only and use.of_type is None:
             text = 'this writes to a message that a read_only subscription shares with others'
             help_text = "write to a copy, as copy.deepcopy makes one, or remove 'read_only: true'"
-            place = span_of(use.module, use.node)
+            place = use.module.span_of(use.node)
             yield Problem('read-only-message', text, place, help_text)
 
 
@@ -86,7 +85,7 @@ def _wrong_index(array: FieldType, name: str, use: MessageUse) -> Problem | None
         return None
     text = f'there is no item {match[1]}: this has {bound}, from 0 to {bound - 1}'
     index = next(each for each in ast.walk(use.node) if isinstance(each, ast.Subscript)).slice
-    return Problem('bad-index', text, span_of(use.module, index))
+    return Problem('bad-index', text, use.module.span_of(index))
 
 
 def _never_equal(field_type: FieldType, use: MessageUse) -> Problem | None:
@@ -101,7 +100,7 @@ def _never_equal(field_type: FieldType, use: MessageUse) -> Problem | None:
     if own is other:
         return None
     text = f'values of these types are never equal: {own.__name__} and {other.__name__}'
-    return Problem('never-equal', text, span_of(use.module, use.compared))
+    return Problem('never-equal', text, use.module.span_of(use.compared))
 
 
 def _unknown(
@@ -110,7 +109,7 @@ def _unknown(
     if name.startswith('_') or name in _OF_CLASSES:
         return None
     known = types.constants(owner.name)
-    shown, place = in_python(owner.name), span_of(use.module, use.node)
+    shown, place = in_python(owner.name), use.module.span_of(use.node)
     place = place if place.text == name else place.narrowed_to(name)
     if name.isupper():
         if types.may_have_constant(owner.name, name):

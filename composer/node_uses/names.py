@@ -20,10 +20,15 @@ from composer.node_uses.values import (
     Value,
 )
 from composer.python_source.annotations import find_interface
-from composer.python_source.local_names import list_arguments, nested_names, stored_names
 from composer.python_source.modules import MOST_BASES, FunctionSource, ModuleSource
-from composer.python_source.syntax import FunctionNode, list_children
-from composer.python_source.top_names import TopNames
+from composer.python_source.syntax import (
+    FunctionNode,
+    bound_names,
+    imported_names,
+    list_arguments,
+    own_nodes,
+    positional_names,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,23 +49,11 @@ MADE = {
     },
 }
 _INSTALLED = {'site-packages', 'dist-packages'}
-_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
 _Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
 # Longer ways from a name to its value are not followed.
 _MOST_STEPS = 25
-
-
-def own_nodes(definition: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a function, and not those of functions and classes in it."""
-    body = getattr(definition, 'body', [])
-    pending: list[ast.AST] = list(body) if isinstance(body, list) else [body]
-    while pending:
-        node = pending.pop()
-        yield node
-        if not isinstance(node, _SCOPES):
-            pending += list_children(node)
 
 
 def is_of_project(module: ModuleSource, name: str, finder: ModuleFinder) -> bool:
@@ -84,16 +77,9 @@ class Names:
         self._kinds: dict[int, FunctionKind | None] = {}
         # How many expressions were walked through.
         self.walked = 0
-        self._tops: dict[int, TopNames] = {}
         self._stored: dict[int, dict[str, list[_Stored]]] = {}
         self._members: dict[int, _Members] = {}
         self._steps = 0
-
-    def top(self, module: ModuleSource) -> TopNames:
-        """Return the names at the top of a module."""
-        if id(module) not in self._tops:
-            self._tops[id(module)] = TopNames(module.body)
-        return self._tops[id(module)]
 
     def kind_of(self, definition: FunctionNode) -> FunctionKind | None:
         """Return what a function returns; reading all of it takes its time."""
@@ -124,10 +110,11 @@ class Names:
     def origin_of(self, module: ModuleSource, name: str) -> tuple[ModuleSource | None, str]:
         """Return the module of the project that stores a name which this one has or imports."""
         for _ in range(_MOST_STEPS):
-            statements = self.top(module).statements.get(name, [])
+            statements = module.top.statements.get(name, [])
             if not statements or not isinstance(statements[0][0], ast.Import | ast.ImportFrom):
                 return (module, name) if statements else (None, name)
-            home, _, name = self._full_name(module, statements[0][0], name).rpartition('.')
+            full_name = self._full_name(module, statements[0][0], name)
+            home, _, name = full_name.rpartition('.')
             found = self.find_module(home)
             if found is None:
                 break
@@ -216,7 +203,7 @@ class Names:
 
     def top_value(self, module: ModuleSource, name: str) -> Value | None:
         """Return what a name at the top of a module stands for."""
-        top = self.top(module)
+        top = module.top
         statements = top.statements.get(name, [])
         if not statements:
             is_builtin = not top.is_open and hasattr(builtins, name)
@@ -246,27 +233,15 @@ class Names:
             case ast.Import() | ast.ImportFrom():
                 return self._imported(self._full_name(module, statement, name))
         for target, value, is_item in _assignments(statement):
-            is_changed = name in self.top(module).stored_again and isinstance(value, ast.Constant)
+            is_changed = name in module.top.stored_again and isinstance(value, ast.Constant)
             if isinstance(target, ast.Name) and target.id == name and not is_item:
                 return None if is_changed else self.value_of(value, Scope(module))
         return None
 
     def _full_name(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
         """Return the full name of what an import stores under a name; empty if unknown."""
-        if isinstance(statement, ast.Import):
-            full = (alias.name for alias in statement.names if alias.asname == name)
-            return next(full, name)
-        home = getattr(statement, 'module', '') or ''
-        level: int = getattr(statement, 'level', 0)
-        if level:
-            base = self._module_names.get(id(module), '').split('.')
-            is_package = module.path is not None and module.path.name == '__init__.py'
-            kept = base[: len(base) - level + is_package]
-            home = '.'.join([*kept, *filter(None, [home])])
-        for alias in getattr(statement, 'names', ()):
-            if home and (alias.asname or alias.name) == name:
-                return f'{home}.{alias.name}'
-        return ''
+        own = self.name_of(module)
+        return dict(imported_names(statement, own, is_package=module.is_package)).get(name, '')
 
     def _imported(self, full_name: str) -> Value | None:
         if not full_name:
@@ -313,8 +288,7 @@ class Names:
                 if len(stored) > 1 or self._is_stored(each.module, name, 1):
                     return None
                 given: dict[str, Value] = dict(instance.given) if method.name == '__init__' else {}
-                own_name = next(list_arguments(method.args), None)
-                given |= {own_name.arg: instance} if own_name else {}
+                given |= dict.fromkeys(positional_names(method)[:1], instance)
                 return self.value_of(kept, Scope(each.module, method, given))
         return None
 
@@ -325,7 +299,7 @@ class Names:
 
     def _is_stored(self, module: ModuleSource, name: str, times: int = 0) -> bool:
         """Return whether code may store an attribute more often than that."""
-        stored = self.top(module).stored_attributes
+        stored = module.top.stored_attributes
         return stored[''] > 0 or stored[name] > times
 
     def bases_of(self, of: Class) -> Iterator[Class]:
@@ -349,8 +323,7 @@ class Names:
 
     def bind(self, function: Function, call: ast.Call, scope: Scope) -> dict[str, Value]:
         """Return what the parameters of a function stand for in a call, without its `self`."""
-        arguments = function.definition.args
-        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        names = positional_names(function.definition)
         names = names[1:] if function.bound is not None else names
         pairs: list[tuple[str, ast.expr]] = []
         for name, value in zip(names, call.args, strict=False):
@@ -382,25 +355,17 @@ def _find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
     nodes = list(own_nodes(definition))
     found: dict[str, list[_Stored]] = {}
     shown: set[int] = set()
-    shared = {
-        name
-        for node in nodes
-        if isinstance(node, ast.Global | ast.Nonlocal)
-        for name in node.names
-    }
+    shared: set[str] = set()
     for node in nodes:
+        shared |= {*node.names} if isinstance(node, ast.Global | ast.Nonlocal) else set()
         for target, value, is_item in _assignments(node):
             if isinstance(target, ast.Name):
                 shown.add(id(target))
                 found.setdefault(target.id, []).append((value, is_item))
-    for stored in stored_names(nodes):
-        if id(stored) not in shown:
-            found.setdefault(stored.id, []).append((None, False))
-    functions = {node.name: node for node in nodes if isinstance(node, _FUNCTIONS)}
-    for name, function in functions.items():
-        found.setdefault(name, []).append((function, False))
-    for each in (nested_names(nodes) - functions.keys()) | _patterns(nodes):
-        found.setdefault(each, []).append((None, False))
+    for node in nodes:
+        function = node if isinstance(node, _FUNCTIONS) else None
+        for name in bound_names(node) if id(node) not in shown else ():
+            found.setdefault(name, []).append((function, False))
     return {name: several for name, several in found.items() if name not in shared}
 
 
@@ -423,18 +388,6 @@ def _assignments(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
             yield target, value, True
 
 
-def _patterns(nodes: list[ast.AST]) -> set[str]:
-    """Return the names that patterns store."""
-    found = {
-        node.name
-        for node in nodes
-        if isinstance(node, ast.MatchAs | ast.MatchStar) and node.name is not None
-    }
-    return found | {
-        node.rest for node in nodes if isinstance(node, ast.MatchMapping) and node.rest
-    }
-
-
 class _Members:
     """The methods of a class, and what its body and its methods assign to its attributes."""
 
@@ -451,8 +404,7 @@ class _Members:
                     self.assigned[name] = value
 
     def _read(self, method: FunctionNode) -> None:
-        first = next(list_arguments(method.args), None)
-        own_name = first.arg if first else ''
+        own_name = next(iter(positional_names(method)), '')
         for node in own_nodes(method):
             for target, value, _ in _assignments(node):
                 match target:

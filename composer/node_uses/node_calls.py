@@ -17,7 +17,6 @@ from composer.node_uses.reading import (
 )
 from composer.node_uses.values import Chain, External, Function, Texts
 from composer.python_source.modules import read_signature
-from composer.python_source.places import span_of
 from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
@@ -138,7 +137,7 @@ def _note_created(
     _check_options(run, noun, arguments, scope)
     if of_type is not None and channel is not None:
         type_name = _type_named(run, of_type, scope)
-        place = span_of(scope.module, of_type)
+        place = scope.module.span_of(of_type)
         text = _only_text(run.names.value_of(channel, scope))
         name = _only_text(run.names.value_of(arguments.get('name', channel), scope))
         run.reading.created.append(CreatedEntity(noun, name, text, type_name, place))
@@ -204,10 +203,10 @@ def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> N
                 known = None
             remote = RemoteParameter(
                 text,
-                span_of(module, node, text),
+                module.span_of(node, text),
                 key.value,
-                span_of(scope.module, key, key.value),
+                scope.module.span_of(key, key.value),
                 known,
-                span_of(scope.module, value),
+                scope.module.span_of(value),
             )
             run.reading.remote_parameters.append(remote)

@@ -11,7 +11,7 @@ from composer.records import record
 if TYPE_CHECKING:
     import ast
 
-    from composer.diagnostics import Span
+    from composer.diagnostics import Related, Span
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.
@@ -90,12 +90,14 @@ class Problem:
     Attributes:
         rule: The name of the rule that it breaks.
         place: Where it is written.
+        related: Other places that have to do with it.
     """
 
     rule: str
     message: str
     place: Span
     help: str | None = None
+    related: tuple[Related, ...] = ()
 
 
 @record

@@ -15,7 +15,6 @@ from composer.node_uses.names import Names
 from composer.node_uses.values import Class, External, Function, Instance, Made, Scope
 from composer.node_uses.waiting import FILLING
 from composer.python_source.modules import MOST_BASES
-from composer.python_source.places import span_of
 from composer.python_source.syntax import list_nodes
 
 if TYPE_CHECKING:
@@ -96,7 +95,7 @@ class SharedNames:
                 continue
             is_change = is_stored or id(node) in changed
             users = uses.changed if is_change else uses.read
-            users.setdefault(shared, span_of(function.module, node))
+            users.setdefault(shared, function.module.span_of(node))
         return found
 
     def _shared(self, node: ast.Name | ast.Attribute, scope: Scope) -> SharedName | None:
@@ -132,7 +131,7 @@ class SharedNames:
             home, name = self._names.origin_of(module, name)
             if home is None:
                 return None
-            match self._names.top(home).statements.get(name):
+            match home.top.statements.get(name):
                 case [(ast.Assign(value=ast.Name(id=other)), _)]:
                     # The same object by another name.
                     module, name = home, other

@@ -6,10 +6,9 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.node_uses.literals import number_of
-from composer.node_uses.names import own_nodes
 from composer.node_uses.reading import Awaited, Block
 from composer.node_uses.values import Chain, External, Made
-from composer.python_source.places import span_of
+from composer.python_source.syntax import own_nodes
 
 if TYPE_CHECKING:
     from composer.node_uses.current_run import Run
@@ -48,7 +47,7 @@ def note_method(run: Run, owner: Made, call: ast.Call, name: str, scope: Scope) 
     if owner.kind == LOCK:
         _note_lock(run, owner, call, name, scope)
     elif owner.kind in WAITING:
-        place = span_of(owner.module, owner.node)
+        place = owner.module.span_of(owner.node)
         made_at = f'{place.source.name}:{place.line}:{place.column}'
         noun = f'this {owner.kind.rpartition(".")[2].lower()}'
         _note(run, Awaited(owner.kind, made_at, noun, place), call, name, scope)
@@ -74,7 +73,7 @@ def _note(run: Run, what: Awaited, call: ast.Call, name: str, scope: Scope) -> N
 def _block(run: Run, what: Awaited, scope: Scope, node: ast.expr) -> None:
     if scope.waits and not (run.doubts or run.broad_guards):
         called_at = run.calls[0] if run.calls else None
-        run.reading.blocks.append(Block(what, span_of(scope.module, node), called_at))
+        run.reading.blocks.append(Block(what, scope.module.span_of(node), called_at))
 
 
 def _is_timed(name: str, call: ast.Call) -> bool:
@@ -121,7 +120,7 @@ def note_sleep(run: Run, seconds: ast.expr, node: ast.expr, scope: Scope) -> Non
     """Note how long the behaviour sleeps."""
     number = number_of(_meant(run, seconds, scope))
     if number is not None and scope.waits and not run.doubts:
-        run.reading.sleeps.append((float(number), span_of(scope.module, node)))
+        run.reading.sleeps.append((float(number), scope.module.span_of(node)))
 
 
 def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
@@ -133,7 +132,7 @@ def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
         value, is_item = stored[0]
         is_known = len(stored) == 1 and isinstance(value, ast.expr) and not is_item
         return value if is_known and isinstance(value, ast.expr) else node
-    top = run.names.top(scope.module)
+    top = scope.module.top
     match top.statements.get(node.id):
         case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
             return node if node.id in top.stored_again else value
@@ -220,7 +219,7 @@ def global_name(run: Run, name: str, scope: Scope) -> Awaited | None:
     is_own = scope.definition is not None and (
         name in run.names.stored_in(scope.definition) or name in scope.given
     )
-    if is_own or name not in run.names.top(scope.module).stored_again:
+    if is_own or name not in scope.module.top.stored_again:
         return None
     return Awaited('', _path_of(scope.module), name)
 

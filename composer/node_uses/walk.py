@@ -22,10 +22,8 @@ from composer.node_uses.values import (
     Value,
 )
 from composer.python_source.annotations import find_interface
-from composer.python_source.local_names import list_arguments
 from composer.python_source.modules import read_signature
-from composer.python_source.places import span_of
-from composer.python_source.syntax import list_children
+from composer.python_source.syntax import list_arguments, list_children, positional_names, words_in
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -187,15 +185,14 @@ class Walk:
                 self._use_message(value, node, scope)
             else:
                 self._note_read(value, node, scope)
-        self.run.calls.append(span_of(scope.module, call))
+        self.run.calls.append(scope.module.span_of(call))
         self.enter(function, given, is_waited=is_waited and scope.waits)
         self.run.calls.pop()
 
     def _hand_on(self, function: Function, given: Sequence[Value | None]) -> None:
         """Walk through a function that something may call later, with these arguments first."""
         definition = function.definition
-        names = [each.arg for each in (*definition.args.posonlyargs, *definition.args.args)]
-        names = names[1:] if function.bound is not None else names
+        names = positional_names(definition)[1 if function.bound is not None else 0 :]
         pairs = zip(names, given, strict=False)
         self.enter(
             function, {name: value for name, value in pairs if value is not None}, is_waited=False
@@ -319,7 +316,7 @@ class Walk:
                 func = self._names.value_of(item.context_expr.func, scope)
                 # One of the project may catch what its body raises.
                 is_guard |= isinstance(func, Class) or bool(
-                    _words(item.context_expr.func) & {'raises', 'suppress'}
+                    words_in(item.context_expr.func) & {'raises', 'suppress'}
                 )
                 is_guard |= func is None and isinstance(item.context_expr.func, ast.Name)
         with self.run.guard(is_guard=is_guard):
@@ -475,7 +472,7 @@ class Walk:
 
     def _is_constant(self, name: str, scope: Scope) -> bool:
         """Return whether a name is one that a module never changes, or imports."""
-        match self._names.top(scope.module).statements.get(name):
+        match scope.module.top.statements.get(name):
             case [(ast.Assign(value=ast.Constant()) | ast.ImportFrom(), _), *_]:
                 return name.isupper()
         return False
@@ -518,7 +515,7 @@ class Walk:
                 ):
                     return
                 if of == 'parameters' or len(run.held_states) == run.state_doubts:
-                    needed = NeededValue(of, name, span_of(scope.module, node), run.held_states)
+                    needed = NeededValue(of, name, scope.module.span_of(node), run.held_states)
                     run.reading.values_needed.append(needed)
 
     # Expressions
@@ -594,7 +591,7 @@ class Walk:
                 self._hand_on(value, [])
 
     def _check_defined(self, node: ast.Name, scope: Scope) -> None:
-        top = self._names.top(scope.module)
+        top = scope.module.top
         if top.is_open or top.is_dynamic or node.id in top.all_stored or node.id[:2] == '__':
             return
         if self._names.top_value(scope.module, node.id) is None:
@@ -631,7 +628,7 @@ class Walk:
         named = self._names.value_of(key, scope)
         is_guarded = bool(self.run.guards or self.run.doubts)
         for text, node, module in named.options if isinstance(named, Texts) else ():
-            use = StateUse(text, span_of(module, node, text), is_guarded)
+            use = StateUse(text, module.span_of(node, text), is_guarded)
             self.run.reading.own_state_read.append(use)
 
     def _compare(self, node: ast.Compare, scope: Scope) -> None:
@@ -753,7 +750,7 @@ class Walk:
         is_write = not isinstance(getattr(node, 'ctx', None), ast.Load)
         of_type = chain.path[1] if chain.path[0] == 'made' else None
         path = chain.path[2 if of_type else 1 :]
-        is_patched = bool(self._names.top(scope.module).patched & {*path})
+        is_patched = bool(scope.module.top.patched & {*path})
         is_guarded = run.guards or run.broad_guards or run.fixed or is_patched
         if path and (is_write or not is_guarded):
             value, certain = self._stored.get(id(node)), not run.doubts
@@ -1001,17 +998,9 @@ def _tests_in(definition: ast.AST) -> list[ast.AST]:
     return found
 
 
-def _words(expression: ast.expr | None) -> set[str]:
-    if expression is None:
-        return {'BaseException'}
-    nodes = list(ast.walk(expression))
-    names = {node.id for node in nodes if isinstance(node, ast.Name)}
-    return names | {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-
-
 def _is_guard(handler: ast.ExceptHandler) -> bool:
     """Return whether a handler expects wrong names: it catches them, or ignores everything."""
-    names = _words(handler.type)
+    names = words_in(handler.type) if handler.type else {'BaseException'}
     does_nothing = all(isinstance(each, _DOING_NOTHING) for each in handler.body)
     return bool(names & _CATCHING) or (does_nothing and bool(names & _CATCHING_ALL))
 
@@ -1019,7 +1008,7 @@ def _is_guard(handler: ast.ExceptHandler) -> bool:
 def _is_broad(handler: ast.ExceptHandler) -> bool:
     """Return whether a handler catches everything, and goes on."""
     raises = any(isinstance(node, ast.Raise) for each in handler.body for node in ast.walk(each))
-    return bool(_words(handler.type) & _CATCHING_ALL) and not raises
+    return (handler.type is None or bool(words_in(handler.type) & _CATCHING_ALL)) and not raises
 
 
 def _gives(definition: ast.AST) -> bool:

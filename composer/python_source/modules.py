@@ -20,14 +20,18 @@ from composer.input_limits import (
     read_file,
 )
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.local_names import nested_names, stored_names
 from composer.python_source.syntax import (
     BLOCKS,
+    SCOPES,
     FunctionNode,
     UnreadModuleError,
+    bound_names,
+    count_characters,
     count_tokens,
+    imported_names,
     list_children,
     list_nodes,
+    own_nodes,
     parse_source,
 )
 from composer.records import record
@@ -37,7 +41,7 @@ if TYPE_CHECKING:
 
 # Longer lines of classes are not followed.
 MOST_BASES = 20
-_OWN_SCOPE = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+_BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
 @record
@@ -55,12 +59,17 @@ class FunctionSource:
     @cached_property
     def kind(self) -> FunctionKind | None:
         """What it returns, if that is known."""
-        return _kind_of(self.definition) if self.definition else None
+        if self.definition is None:
+            return None
+        yields = self.first_yield is not None
+        if isinstance(self.definition, ast.AsyncFunctionDef):
+            return FunctionKind.ASYNC_GENERATOR if yields else FunctionKind.COROUTINE
+        return FunctionKind.GENERATOR if yields else FunctionKind.PLAIN
 
     @cached_property
     def first_yield(self) -> int | None:
         """The line of its first `yield`, if it has one."""
-        nodes = _own_nodes(self.definition) if self.definition else []
+        nodes = own_nodes(self.definition) if self.definition else ()
         lines = [node.lineno for node in nodes if isinstance(node, ast.Yield | ast.YieldFrom)]
         return min(lines, default=None)
 
@@ -72,17 +81,111 @@ class FunctionSource:
         return read_signature(self.definition.args) if self.definition else None
 
 
+class TopNames:
+    """The names that the statements of a module store, each with whether on a condition.
+
+    Attributes:
+        is_open: Whether there may be others.
+    """
+
+    def __init__(self, body: Iterable[ast.stmt] = ()) -> None:
+        self.statements: dict[str, list[tuple[ast.AST, bool]]] = {}
+        self.is_open = False
+        self._body = list(body)
+        pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(self._body)]
+        while pending:
+            statement, is_conditional = pending.pop()
+            for node in _nodes_beside_blocks(statement):
+                for name in bound_names(node):
+                    self.statements.setdefault(name, []).append((statement, is_conditional))
+                    self.is_open |= name in ('*', '__getattr__')
+                self.is_open |= _may_store_any(node)
+            if not isinstance(statement, _BINDING):
+                blocks = (getattr(statement, name, ()) for name in BLOCKS)
+                pending += [(each, True) for block in blocks for each in reversed(block)]
+
+    @cached_property
+    def is_dynamic(self) -> bool:
+        """Whether code may store any name: `globals()['x'] = 1`, `exec`, `sys.modules`."""
+        return any(map(_may_store_any, self._nodes))
+
+    @cached_property
+    def stored_again(self) -> frozenset[str]:
+        """Names that functions store, and those of which items are stored."""
+        found: set[str] = set()
+        for node in self._nodes:
+            match node:
+                case ast.Global(names=names):
+                    found |= set(names)
+                case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store() | ast.Del()):
+                    found.add(name)
+                case ast.AugAssign(target=ast.Name(id=name)):
+                    found.add(name)
+        return frozenset(found)
+
+    @cached_property
+    def patched(self) -> frozenset[str]:
+        """Names of attributes that the module itself stores in something, and `setattr` does."""
+        body = [each for each in self._body if not isinstance(each, _BINDING)]
+        return frozenset(_stored_attributes(list_nodes(body))) - {''}
+
+    @cached_property
+    def stored_attributes(self) -> Counter[str]:
+        """How often code stores attributes, by their names; empty for one that is computed."""
+        return _stored_attributes(self._nodes)
+
+    @cached_property
+    def all_stored(self) -> frozenset[str]:
+        """All names that the module stores anywhere."""
+        return frozenset(name for node in self._nodes for name in bound_names(node))
+
+    @cached_property
+    def _nodes(self) -> list[ast.AST]:
+        return list_nodes(self._body)
+
+
+def _nodes_beside_blocks(statement: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a statement without those of the statements in it."""
+    pending: list[ast.AST] = [statement]
+    while pending:
+        node = pending.pop()
+        yield node
+        if not isinstance(node, SCOPES):
+            inner = (ast.stmt, ast.ExceptHandler, ast.match_case, ast.comprehension)
+            pending += [each for each in list_children(node) if not isinstance(each, inner)]
+
+
+def _may_store_any(node: ast.AST) -> bool:
+    match node:
+        case ast.Call(func=ast.Name('exec' | 'eval' | 'globals' | 'locals' | 'vars')):
+            return True
+        case ast.Attribute(attr='modules' | '__dict__') | ast.alias(name='modules'):
+            return True
+        case ast.Call(func=ast.Name('setattr'), args=[ast.Name(), key, _]):
+            return not isinstance(key, ast.Constant)
+    return False
+
+
+def _stored_attributes(nodes: Iterable[ast.AST]) -> Counter[str]:
+    found: Counter[str] = Counter()
+    for node in nodes:
+        match node:
+            case ast.Attribute(attr='__dict__' | '__setattr__') | ast.Name(id='vars'):
+                found[''] += 1
+            case ast.Attribute(attr=name, ctx=ast.Store()):
+                found[name] += 1
+            case ast.Call(func=ast.Name('setattr'), args=[_, ast.Constant(str(name)), _]):
+                found[name] += 2
+            case ast.Call(func=ast.Name('setattr'), args=[ast.Name(), *_]):
+                found[''] += 1
+    return found
+
+
 @dataclass(eq=False)
 class ModuleSource:
     """The names that a module defines.
 
     Attributes:
-        functions: The names that can be called, or perhaps can.
-        constants: The names that cannot be called, and what they are.
-        imports: The full dotted names of what is imported, by name; without names that have
-            several meanings, and with imports for type checkers.
-        texts: The constants that are texts, with these.
-        required: The imports that are run on no condition.
         lines: The lines of its source.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
         syntax_error: The syntax error in its source, or `None`.
@@ -90,15 +193,11 @@ class ModuleSource:
         unread: Why its source is not read although it may be valid, or `None`.
         tokens: How many words and signs it has.
         body: Its statements.
+        top: The names that these store.
         content: Its source, if it was read and is valid.
     """
 
     path: Path | None
-    functions: dict[str, FunctionSource] = field(default_factory=dict)
-    constants: dict[str, str] = field(default_factory=dict)
-    imports: dict[str, str] = field(default_factory=dict)
-    texts: dict[str, str] = field(default_factory=dict)
-    required: tuple[ast.Import | ast.ImportFrom, ...] = ()
     lines: tuple[str, ...] = ()
     is_open: bool = False
     syntax_error: str | None = None
@@ -106,7 +205,50 @@ class ModuleSource:
     unread: str | None = None
     tokens: int = 0
     body: tuple[ast.stmt, ...] = field(default=(), repr=False)
+    top: TopNames = field(default_factory=TopNames, repr=False)
     content: bytes | None = field(default=None, repr=False)
+
+    @property
+    def is_package(self) -> bool:
+        """Whether it is the `__init__.py` of a package."""
+        return self.path is not None and self.path.name == '__init__.py'
+
+    @cached_property
+    def functions(self) -> dict[str, FunctionSource]:
+        """The names that can be called, or perhaps can."""
+        meanings = self._meanings.items()
+        return {name: what for name, what in meanings if isinstance(what, FunctionSource)}
+
+    @cached_property
+    def constants(self) -> dict[str, str]:
+        """The names that cannot be called, and what they are."""
+        return {name: what for name, what in self._meanings.items() if isinstance(what, str)}
+
+    @cached_property
+    def imports(self) -> dict[str, str]:
+        """The full dotted names of what is imported, by names that have one meaning.
+
+        Imports for type checkers count as well.
+        """
+        found: dict[str, set[str]] = {}
+        for name, statements in self.top.statements.items():
+            for node, _ in statements:
+                is_import = isinstance(node, ast.Import | ast.ImportFrom)
+                names = dict(imported_names(node)) if is_import else {}
+                found.setdefault(name, set()).add(names.get(name, ''))
+        return {name: min(full) for name, full in found.items() if len(full) == 1 and min(full)}
+
+    @cached_property
+    def _meanings(self) -> dict[str, FunctionSource | str]:
+        """What each name is; of one that a conditional statement binds again, nothing is known."""
+        found: dict[str, FunctionSource | str] = {}
+        for name, statements in self.top.statements.items():
+            for node, is_conditional in statements:
+                meaning = _meaning_of(node, name)
+                if meaning is not None and name != '*':
+                    is_either = is_conditional and name in found
+                    found[name] = FunctionSource() if is_either else meaning
+        return found
 
     def find_function(self, name: str) -> FunctionSource | None:
         """Return a function by its name, or a method as `Class.method`, without its `self`."""
@@ -126,10 +268,8 @@ class ModuleSource:
         own = [each for each in definition.body if getattr(each, 'name', '') == name]
         if own and isinstance(own[-1], ast.FunctionDef | ast.AsyncFunctionDef):
             return _as_method(own[-1])
-        nodes = list(ast.walk(definition))
-        if name in {each.id for each in stored_names(nodes)} | nested_names(nodes):
-            return FunctionSource()
-        if definition.decorator_list or definition.keywords:
+        is_bound = any(name in bound_names(node) for node in ast.walk(definition))
+        if is_bound or definition.decorator_list or definition.keywords:
             return FunctionSource()
         for base in definition.bases:
             simple = base.id if isinstance(base, ast.Name) else ''
@@ -160,6 +300,29 @@ class ModuleSource:
         return Span(
             self.source, line, len(text) - len(text.lstrip()) + 1, max(len(text.strip()), 1)
         )
+
+    def span_of(self, node: ast.AST, name: str = '') -> Span:
+        """Return the characters of an expression on its last line; of a text, its content.
+
+        Args:
+            name: What to mark in it: the text, or the last name of a chain of attributes.
+        """
+        first_line: int = getattr(node, 'lineno', 1)
+        line: int = getattr(node, 'end_lineno', first_line)
+        start: int = getattr(node, 'col_offset', 0) if first_line == line else 0
+        end: int = getattr(node, 'end_col_offset', None) or start + 1
+        if isinstance(node, ast.Attribute):
+            name = node.attr
+        elif isinstance(node, _BINDING):
+            line, name = first_line, node.name
+            start, end = 0, len(self.source.line(line).encode())
+        text = self.source.line(line)
+        first, last = count_characters(text, start), count_characters(text, end)
+        found = text[first:last].rfind(name) if name else -1
+        if found >= 0:
+            first += found
+            last = first + len(name)
+        return Span(self.source, line, first + 1, max(last - first, 1))
 
 
 def read_module(
@@ -192,161 +355,27 @@ def read_module(
         where = f'{path}:{line}' if line else str(path)
         reason = f'{where}: {getattr(error, "msg", error)}'
         return ModuleSource(path, lines=lines, syntax_error=reason, error_line=line)
-    reader = _ModuleReader()
-    reader.read(tree.body)
-    return ModuleSource(
-        path,
-        reader.functions,
-        reader.constants,
-        {name: full_name for name, full_name in reader.imports.items() if full_name},
-        {name: text for name, text in find_texts(tree.body).items() if name in reader.constants},
-        tuple(reader.required),
-        lines,
-        reader.is_open,
-        tokens=tokens,
-        body=tuple(tree.body),
-        content=text,
-    )
+    body, top = tuple(tree.body), TopNames(tree.body)
+    return ModuleSource(path, lines, top.is_open, tokens=tokens, body=body, top=top, content=text)
 
 
-def find_texts(body: list[ast.stmt], nodes: Iterable[ast.AST] | None = None) -> dict[str, str]:
-    """Return the names that statements assign only one text, with that text.
-
-    Args:
-        nodes: All nodes of the statements, if they are at hand.
-    """
-    texts = {name: text for statement in body for name, text in _read_text(statement)}
-    if not texts:
-        return {}
-    if nodes is None:
-        nodes = list_nodes(body)
-    stored = Counter(name.id for name in stored_names(nodes))
-    return {name: text for name, text in texts.items() if stored[name] == 1}
-
-
-def _read_text(statement: ast.stmt) -> Iterator[tuple[str, str]]:
-    if isinstance(statement, ast.Assign):
-        targets: list[ast.expr] = statement.targets
-        value: ast.expr | None = statement.value
-    elif isinstance(statement, ast.AnnAssign):
-        targets, value = [statement.target], statement.value
-    else:
-        return
-    if isinstance(value, ast.Constant) and isinstance(value.value, str):
-        yield from ((each.id, value.value) for each in targets if isinstance(each, ast.Name))
-
-
-class _ModuleReader:
-    """Collects the names that the statements of a module bind.
-
-    Later ones win; of a name that a conditional statement binds again, nothing is known.
-    """
-
-    def __init__(self) -> None:
-        self.functions: dict[str, FunctionSource] = {}
-        self.constants: dict[str, str] = {}
-        self.imports: dict[str, str] = {}
-        self.required: list[ast.Import | ast.ImportFrom] = []
-        self.is_open = False
-        self._is_conditional = False
-
-    def read(self, body: list[ast.stmt]) -> None:
-        pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(body)]
-        while pending:
-            statement, self._is_conditional = pending.pop()
-            inner = self._read_statement(statement)
-            pending += [(each, True) for each in reversed(inner)]
-
-    def _read_statement(self, statement: ast.AST) -> list[ast.AST]:
-        """Read a statement; return those in it that are run on a condition."""
-        if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
-            self.is_open |= statement.name == '__getattr__'
+def _meaning_of(statement: ast.AST, name: str) -> FunctionSource | str | None:
+    """Return what a statement makes of a name: something to call, or what else."""
+    match statement:
+        case ast.FunctionDef() | ast.AsyncFunctionDef():
             # Decorators may change both kind and signature.
-            known = None if statement.decorator_list else statement
-            self._bind(statement.name, FunctionSource(known))
-        elif isinstance(statement, ast.ClassDef):
-            self._bind(statement.name, FunctionSource(class_definition=statement))
-        elif isinstance(statement, ast.Import | ast.ImportFrom):
-            self._read_import(statement)
-        elif isinstance(statement, ast.Assign | ast.AnnAssign):
-            self._read_assignment(statement)
-        else:
-            self._read_stores(statement)
-            blocks = (getattr(statement, name, ()) for name in BLOCKS)
-            return [each for block in blocks for each in block]
-        return []
-
-    def _read_stores(self, statement: ast.AST) -> None:
-        """Read the names that a statement stores beside those of the statements in it."""
-        pending = [statement]
-        while pending:
-            node = pending.pop()
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                self._bind(node.id, FunctionSource())
-            # Names may be stored in `globals()` or `sys.modules[__name__]`.
-            is_open = isinstance(node, ast.Name) and node.id in ('globals', 'vars', 'exec')
-            is_module = isinstance(node, ast.Attribute) and node.attr == 'modules'
-            self.is_open |= is_open or is_module
-            if not isinstance(node, _OWN_SCOPE):
-                pending += [
-                    each
-                    for each in list_children(node)
-                    if not isinstance(each, ast.stmt | ast.ExceptHandler | ast.match_case)
-                ]
-
-    def _read_import(self, statement: ast.Import | ast.ImportFrom) -> None:
-        if not self._is_conditional:
-            self.required.append(statement)
-        for alias in statement.names:
-            if alias.name == '*':
-                self.is_open = True
-            elif isinstance(statement, ast.Import):
-                name = (alias.asname or alias.name).partition('.')[0]
-                self._constant(name, 'a module', alias.name if alias.asname else name)
-            else:
-                within = '' if statement.level else statement.module
-                full_name = f'{within}.{alias.name}' if within else ''
-                self._bind(alias.asname or alias.name, FunctionSource(), full_name)
-
-    def _read_assignment(self, statement: ast.Assign | ast.AnnAssign) -> None:
-        targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
-        value = statement.value
-        if value is not None:
-            self._read_stores(value)
-        for target in targets:
-            if not isinstance(target, ast.Name):
-                self._read_stores(target)
-            # Of something that may be this module: `sys.modules[__name__].run = walk`.
-            if isinstance(target, ast.Attribute) and target.attr in self.functions:
-                self._bind(target.attr, FunctionSource())
-        for target in targets:
-            for node in ast.walk(target):
-                if not isinstance(node, ast.Name):
-                    continue
-                if isinstance(value, ast.Constant) and node is target:
-                    self._constant(node.id, _describe_constant(value.value))
-                elif value is not None:
-                    self._bind(node.id, FunctionSource())
-
-    def _bind(self, name: str, function: FunctionSource, full_name: str = '') -> None:
-        if self._is_conditional and (name in self.functions or name in self.constants):
-            function = FunctionSource()
-        self._note_import(name, full_name)
-        self.constants.pop(name, None)
-        self.functions[name] = function
-
-    def _constant(self, name: str, what: str, full_name: str = '') -> None:
-        if self._is_conditional and name in self.functions:
-            self._bind(name, FunctionSource(), full_name)
-            return
-        self._note_import(name, full_name)
-        self.functions.pop(name, None)
-        self.constants[name] = what
-
-    def _note_import(self, name: str, full_name: str) -> None:
-        """Store the meaning of a name; a name with several meanings has none."""
-        if self.imports.setdefault(name, full_name) != full_name:
-            self.imports[name] = ''
+            return FunctionSource(None if statement.decorator_list else statement)
+        case ast.ClassDef():
+            return FunctionSource(class_definition=statement)
+        case ast.Import():
+            return 'a module'
+        case ast.AnnAssign(value=None):
+            return None
+        case ast.Assign() | ast.AnnAssign() if isinstance(statement.value, ast.Constant):
+            targets = getattr(statement, 'targets', [getattr(statement, 'target', None)])
+            if any(isinstance(each, ast.Name) and each.id == name for each in targets):
+                return _describe_constant(statement.value.value)
+    return FunctionSource()
 
 
 def _as_method(node: FunctionNode) -> FunctionSource:
@@ -374,37 +403,17 @@ def _describe_constant(value: object) -> str:
         return f'an {kind}'
 
 
-def _kind_of(node: FunctionNode) -> FunctionKind:
-    yields = any(isinstance(inner, ast.Yield | ast.YieldFrom) for inner in _own_nodes(node))
-    if isinstance(node, ast.AsyncFunctionDef):
-        return FunctionKind.ASYNC_GENERATOR if yields else FunctionKind.COROUTINE
-    return FunctionKind.GENERATOR if yields else FunctionKind.PLAIN
-
-
-def _own_nodes(function: FunctionNode) -> list[ast.AST]:
-    """Return the nodes of a function's body without those of functions inside it."""
-    found: list[ast.AST] = []
-    pending: list[ast.AST] = list(function.body)
-    while pending:
-        node = pending.pop()
-        found.append(node)
-        if not isinstance(node, _OWN_SCOPE):
-            pending += list_children(node)
-    return found
-
-
 def _read_constructor(definition: ast.ClassDef) -> inspect.Signature | None:
     """Return the parameters of a plain class, `None` if others may decide about them."""
     if definition.bases or definition.keywords or definition.decorator_list:
         return None
-    names = {name.id for name in stored_names(ast.walk(definition))}
-    inner = nested_names(ast.walk(definition))
-    if '__new__' in names | inner or '__init__' in names:
-        return None
+    bound = [name for node in ast.walk(definition) for name in bound_names(node)]
     functions = (each for each in definition.body if isinstance(each, ast.FunctionDef))
     makers = [each for each in functions if each.name == '__init__']
+    if '__new__' in bound or bound.count('__init__') != len(makers):
+        return None
     if not makers:
-        return None if '__init__' in inner else inspect.Signature()
+        return inspect.Signature()
     if len(makers) > 1 or makers[0].decorator_list:
         return None
     signature = read_signature(makers[0].args)

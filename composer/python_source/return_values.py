@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from composer.python_source.annotations import dotted_name
-from composer.python_source.local_names import stored_names
+from composer.python_source.syntax import positional_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,12 +59,7 @@ def always_answers(function: FunctionNode) -> bool:
     The second parameter, a message, is such a value, and so are its fields.
     """
     message = _message_of(function)
-    stored = {
-        node.id
-        for node in ast.walk(function)
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
-    }
-    sure = set() if message in stored else {message}
+    sure = set() if message in _stored_in(function) else {message}
     answers = [statement.value for statement in _returns(function)]
     raises = any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function))
     ends = not raises and _ends(function)
@@ -74,14 +69,18 @@ def always_answers(function: FunctionNode) -> bool:
 def passes_message_on(function: FunctionNode) -> bool:
     """Return whether a function returns its second parameter, a message, as it is."""
     message = _message_of(function)
-    if not message or any(name.id == message for name in stored_names(ast.walk(function))):
+    if not message or message in _stored_in(function):
         return False
     return any(_may_be(answer.value, message) for answer in _returns(function))
 
 
 def _message_of(function: FunctionNode) -> str:
-    arguments = [*function.args.posonlyargs, *function.args.args]
-    return arguments[1].arg if len(arguments) > 1 else ''
+    return next(iter(positional_names(function)[1:]), '')
+
+
+def _stored_in(node: ast.AST) -> set[str]:
+    names = [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
+    return {name.id for name in names if not isinstance(name.ctx, ast.Load)}
 
 
 def _may_be(answer: ast.expr | None, name: str) -> bool:
@@ -181,8 +180,8 @@ class _Ways:
         for node in ast.walk(function) if is_certain else ():
             if isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) and node.value:
                 subjects = self._subjects(node.value)
-                for name in stored_names(ast.walk(node)):
-                    self._sources.setdefault(name.id, set()).update(subjects)
+                for name in _stored_in(node):
+                    self._sources.setdefault(name, set()).update(subjects)
 
     def follow(self, block: list[ast.stmt], tested: _Tested) -> _Tested:
         """Return what was tested on the way to the end of a block; `None` if there is no way."""
@@ -261,7 +260,7 @@ class _Ways:
         before = self._continued, self._broken
         self._continued, self._broken = [], []
         # Which round is the last may be tested by what the loop stores.
-        stored = {name.id for name in stored_names(ast.walk(node))}
+        stored = _stored_in(node)
         body = self.follow(node.body, tested | self._subjects(source) | stored)
         body, broken = _join(body, *self._continued), self._broken
         self._continued, self._broken = before

@@ -11,7 +11,7 @@ from composer.errors import ComposerError
 from composer.input_limits import MAX_MODULE_TOKENS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
@@ -24,6 +24,7 @@ _MOST_CODE_OBJECTS = 4000
 _MOST_COPIED_CHARACTERS = 200_000
 _CHARACTERS_OF_LINE = 40
 _WAYS_OUT = (ast.Return, ast.Break, ast.Continue)
+SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
 # The fields of statements that hold others.
 BLOCKS = ('body', 'handlers', 'cases', 'orelse', 'finalbody')
 
@@ -50,6 +51,89 @@ def list_nodes(body: Iterable[ast.AST]) -> list[ast.AST]:
     for node in nodes:
         nodes += list_children(node)
     return nodes
+
+
+def own_nodes(definition: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a function, and not those of functions and classes in it."""
+    body = getattr(definition, 'body', [])
+    pending: list[ast.AST] = list(body) if isinstance(body, list) else [body]
+    while pending:
+        node = pending.pop()
+        yield node
+        if not isinstance(node, SCOPES):
+            pending += list_children(node)
+
+
+def bound_names(node: ast.AST) -> list[str]:
+    """Return the names that a node itself binds or deletes, without those that parts of it do."""
+    match node:
+        case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+            return [name]
+        case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+            return [name]
+        case ast.ClassDef(name=name) | ast.ExceptHandler(name=str(name)):
+            return [name]
+        case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)):
+            return [name]
+        case ast.MatchMapping(rest=str(name)):
+            return [name]
+        case ast.Import() | ast.ImportFrom():
+            return [name for name, _ in imported_names(node)]
+    return []
+
+
+def imported_names(
+    statement: ast.AST, module: str = '', *, is_package: bool = False
+) -> Iterator[tuple[str, str]]:
+    """Yield the names that an import binds, with the full names of what they are, if known.
+
+    Args:
+        module: The name of the module with the import, to which it may be relative.
+        is_package: Whether this is the `__init__.py` of a package.
+    """
+    if isinstance(statement, ast.Import):
+        for alias in statement.names:
+            first = alias.name.partition('.')[0]
+            yield alias.asname or first, alias.name if alias.asname else first
+    elif isinstance(statement, ast.ImportFrom):
+        home = home_of(statement, module, is_package=is_package)
+        for alias in statement.names:
+            yield alias.asname or alias.name, f'{home}.{alias.name}' if home else ''
+
+
+def home_of(statement: ast.ImportFrom, module: str, *, is_package: bool) -> str:
+    """Return the full name of the module that names are imported from; empty if unknown."""
+    if not statement.level:
+        return statement.module or ''
+    parts = module.split('.') if module else []
+    package = parts[: max(0, len(parts) - statement.level + is_package)]
+    return '.'.join([*package, *filter(None, [statement.module])]) if package else ''
+
+
+def list_arguments(arguments: ast.arguments) -> list[ast.arg]:
+    """Return all parameters, `*args` and `**kwargs` included."""
+    named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    return [*named, *filter(None, (arguments.vararg, arguments.kwarg))]
+
+
+def positional_names(definition: FunctionNode | ast.Lambda) -> list[str]:
+    """Return the names of the parameters that are given by their positions."""
+    return [each.arg for each in (*definition.args.posonlyargs, *definition.args.args)]
+
+
+def words_in(*nodes: ast.AST | None) -> set[str]:
+    """Return the names and attributes in expressions."""
+    inner = [each for node in nodes if node is not None for each in ast.walk(node)]
+    return {
+        each.id if isinstance(each, ast.Name) else each.attr
+        for each in inner
+        if isinstance(each, ast.Name | ast.Attribute)
+    }
+
+
+def count_characters(line: str, offset: int) -> int:
+    """Return how many characters the first bytes of a line are."""
+    return offset if line.isascii() else len(line.encode()[:offset].decode(errors='ignore'))
 
 
 def count_tokens(content: bytes, path: Path, most: int) -> int:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ast
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule, project_search_path
-from composer.python_source.syntax import UnreadModuleError, parse_source
+from composer.python_source.syntax import home_of
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
 
     from composer.checks.context import CheckContext
@@ -29,21 +28,19 @@ class ProjectModule:
 
     Attributes:
         name: Its dotted name.
-        is_package: Whether it is the `__init__.py` of a package.
-        packages: The interface packages and others that it imports from, by their first names.
+        imports: The dotted names that may be modules which it imports.
     """
 
     name: str
     source: ModuleSource
     tree: ast.Module
-    is_package: bool
     imports: tuple[str, ...]
 
     @property
     def path(self) -> str:
         """Its path in a folder of modules."""
         inner = self.name.replace('.', '/')
-        return f'{inner}/__init__.py' if self.is_package else f'{inner}.py'
+        return f'{inner}/__init__.py' if self.source.is_package else f'{inner}.py'
 
 
 def all_nodes(context: CheckContext) -> list[NodeSpec]:
@@ -88,32 +85,13 @@ def _read(context: CheckContext, name: str, roots: list[Path]) -> ProjectModule 
     source = context.modules.find(name)
     if isinstance(source, MissingModule) or source.path is None or source.content is None:
         return None
-    is_package = source.path.name == '__init__.py'
-    inner = name.replace('.', '/')
-    wanted = f'{inner}/__init__.py' if is_package else f'{inner}.py'
-    if not any(root / wanted == source.path for root in roots):
-        return None
-    try:
-        tree = _parse(source.content, source.path)
-    except (SyntaxError, ValueError, RecursionError, MemoryError, UnreadModuleError):
-        return None
-    imports = tuple(dict.fromkeys(_imported(tree, name, is_package=is_package)))
-    return ProjectModule(name, source, tree, is_package, imports)
-
-
-@lru_cache(_MOST_MODULES)
-def _parse(content: bytes, path: Path) -> ast.Module:
-    return parse_source(content, path)
-
-
-def _imported(tree: ast.Module, name: str, *, is_package: bool) -> Iterator[str]:
-    """Yield the dotted names that may be modules which a module imports."""
-    package = name.split('.') if is_package else name.split('.')[:-1]
+    tree = ast.Module([*source.body], [])
+    imports: list[str] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            imports += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            above = package[: len(package) + 1 - node.level] if node.level else []
-            start = '.'.join([*above, *filter(None, [node.module])])
-            yield start
-            yield from (f'{start}.{alias.name}' for alias in node.names)
+            home = home_of(node, name, is_package=source.is_package)
+            imports += [home, *(f'{home}.{alias.name}' for alias in node.names)]
+    module = ProjectModule(name, source, tree, tuple(dict.fromkeys(imports)))
+    return module if any(root / module.path == source.path for root in roots) else None

@@ -322,15 +322,6 @@ def test_the_folder_of_the_command_comes_first(tmp_path, monkeypatch):
     assert ModuleFinder(path).find('f').path == tmp_path / 'here' / 'f.py'
 
 
-def test_names_of_a_module_that_are_one_text_for_good(tmp_path):
-    path = tmp_path / 'parts.py'
-    path.write_text(
-        "A = 'a'\nB: str = 'b'\nC = 'c'\nC = 'd'\nD = 4\nE = 'e'\n"
-        'def change():\n    global E\n    E = 1\n'
-    )
-    assert read_module(path).texts == {'A': 'a', 'B': 'b'}
-
-
 @pytest.mark.parametrize('name', ['_pydecimal', 'argparse', 'tkinter', 'typing'])
 def test_large_modules_of_the_standard_library_are_read(name):
     path = Path(importlib.util.find_spec(name).origin)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
 from composer.checks.behaviours.behaviour_functions import is_called_wrongly
@@ -17,6 +18,7 @@ from composer.node_uses.literals import find_problems
 from composer.node_uses.message_uses import check_message_uses
 from composer.node_uses.reading import Problem
 from composer.node_uses.wires import type_in
+from composer.records import record
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 
@@ -27,13 +29,11 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Span
     from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.language.specs import NodeSpec
     from composer.node_uses.reading import Reading, RemoteParameter
     from composer.node_uses.wires import Wire
-    from composer.python_source.modules import ModuleSource
 
 _ASK = 'give it a default, or ask whether it is None'
-Readings = list[tuple['Binding', 'Reading']]
 
 
 def bound_at(context: CheckContext, binding: Binding) -> Related:
@@ -43,346 +43,231 @@ def bound_at(context: CheckContext, binding: Binding) -> Related:
 
 def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use fields, attributes and names of `node.state` that exist; each place once."""
-    found: dict[tuple[Span, str], Diagnostic] = {}
-    used, given = _publishing_behaviours(context), _given_types(context)
+    bound: dict[str, _Bindings] = {}
+    for node in context.spec.nodes.values():
+        for binding in context.bindings(node):
+            bindings = bound.setdefault(binding.behaviour.name, _Bindings())
+            bindings.types.add(context.behaviours.wire_of(node, binding).given)
+            bindings.nodes.add(node.key)
+            bindings.is_for_something |= bool(getattr(binding.entity, 'publish', None))
+            bindings.is_for_something |= binding.key.returned not in (None, PUBLISHED)
+    found: dict[tuple[Span | None, str], Diagnostic] = {}
     for node in context.spec.nodes.values():
         readings = [
             (binding, context.behaviours.read(node, binding))
             for binding in context.bindings(node)
             if not context.was_dropped(binding.behaviour.path)
         ]
-        for finding in (
-            *_explain_problems(context, node, readings, given),
-            *_check_state(context, node, readings),
-            *_check_own_state(context, readings),
-            *_check_remote_parameters(context, node, readings),
-            *_check_unpublished(context, readings, used),
-            *_check_created(context, readings),
-        ):
-            if finding.span is not None:
+        for binding, reading in readings:
+            bindings = bound[binding.behaviour.name]
+            for finding in _Body(context, node, binding, reading, readings, bindings).findings():
                 found.setdefault((finding.span, finding.rule), finding)
     yield from found.values()
 
 
-def _given_types(context: CheckContext) -> dict[str, tuple[set[str | None], set[str]]]:
-    """Return the types of messages that each behaviour is given, and the nodes it is bound to."""
-    found: dict[str, tuple[set[str | None], set[str]]] = {}
-    for node in context.spec.nodes.values():
-        for binding in context.bindings(node):
-            wire = context.behaviours.wire_of(node, binding)
-            types, nodes = found.setdefault(binding.behaviour.name, (set(), set()))
-            types.add(wire.given)
-            nodes.add(node.key)
-    return found
+@dataclass(slots=True)
+class _Bindings:
+    """The types of messages that a behaviour is given, its nodes, and if its payloads are used."""
+
+    types: set[str | None] = field(default_factory=set)
+    nodes: set[str] = field(default_factory=set)
+    is_for_something: bool = False
 
 
-def _explain_problems(
-    context: CheckContext,
-    node: NodeSpec,
-    readings: Readings,
-    given: dict[str, tuple[set[str | None], set[str]]],
-) -> Iterator[Diagnostic]:
-    for binding, reading in readings:
-        wire = context.behaviours.wire_of(node, binding)
-        # A behaviour that is given several types tells them apart in its own way.
-        types, binders = given[binding.behaviour.name]
-        problems = [
-            *reading.problems,
-            *_check_payloads(context, node, wire, reading, binders),
-            *check_message_uses(context.types, wire, reading, is_one=len(types) == 1),
-            *_check_parameters_needed(node, reading),
-            *_check_states_needed(node, binding, reading, readings),
-        ]
-        returned = context.types.describe(wire.returned) if wire.returned else None
-        for each in problems:
-            if each.rule == 'missing-return' and returned and not returned.fields:
-                continue
-            if is_shipped(context, binding.behaviour.module):
-                if is_called_wrongly(context, binding):
-                    continue
+@record
+class _Body:
+    """A behaviour, the readings of all behaviours of its node, and where else it is bound to."""
+
+    context: CheckContext
+    node: NodeSpec
+    binding: Binding
+    reading: Reading
+    readings: list[tuple[Binding, Reading]]
+    bindings: _Bindings
+
+    def findings(self) -> Iterator[Diagnostic]:
+        context, behaviour = self.context, self.binding.behaviour
+        is_own = not is_shipped(context, behaviour.module)
+        for problem in self._problems(context.behaviours.wire_of(self.node, self.binding)):
+            if is_own:
+                related = [bound_at(context, self.binding), *problem.related]
+                place, rule, advice = problem.place, problem.rule, problem.help
+                yield diagnostic_at(place, rule, problem.message, help=advice, related=related)
+            elif not is_called_wrongly(context, self.binding):
                 # Its user cannot change what stands there.
-                said = f"'{binding.behaviour.name}' does not work here: {each.message}"
-                yield context.at_value(binding.behaviour.path, each.rule, said, help=each.help)
-                continue
-            yield diagnostic_at(
-                each.place,
-                each.rule,
-                each.message,
-                help=each.help,
-                related=[
-                    bound_at(context, binding),
-                ],
-            )
+                said = f"'{behaviour.name}' does not work here: {problem.message}"
+                yield context.at_value(behaviour.path, problem.rule, said, help=problem.help)
 
-
-def _check_payloads(
-    context: CheckContext, node: NodeSpec, wire: Wire, reading: Reading, binders: set[str]
-) -> Iterator[Problem]:
-    """Check the payloads that are written out in the code."""
-    for each in reading.payloads if context.catalogue.available else ():
-        if each.section:
-            type_name = type_in(node, each.section, each.name, context.has_real_type)
-        else:
-            type_name = getattr(wire, each.name)
-        if type_name is None:
-            continue
-        # Of several nodes, each may have another type under the name.
-        is_one = len(binders) == 1
-        problems = find_problems(context.types, f'{type_name}{each.part}', each.value, each.module)
-        for problem in problems:
-            if is_one or each.is_certain or (problem.help or '').startswith('did you mean'):
+    def _problems(self, wire: Wire) -> Iterator[Problem]:
+        types, reading = self.context.types, self.reading
+        returned = types.describe(wire.returned) if wire.returned else None
+        for problem in reading.problems:
+            if problem.rule != 'missing-return' or returned is None or returned.fields:
                 yield problem
+        # A behaviour that is given several types tells them apart in its own way.
+        yield from check_message_uses(types, wire, reading, is_one=len(self.bindings.types) == 1)
+        yield from self._values_needed()
+        yield from self._state()
+        yield from self._own_state()
+        for remote in reading.remote_parameters:
+            yield from self._remote_parameter(remote)
+        yield from self._unpublished()
+        if self.context.catalogue.available:
+            yield from self._payloads(wire)
+            yield from self._created()
 
+    def _payloads(self, wire: Wire) -> Iterator[Problem]:
+        """Check the payloads that are written out in the code."""
+        context = self.context
+        for sent in self.reading.payloads:
+            if sent.section:
+                type_name = type_in(self.node, sent.section, sent.name, context.has_real_type)
+            else:
+                type_name = getattr(wire, sent.name)
+            if type_name is None:
+                continue
+            # Of several nodes, each may have another type under the name.
+            is_certain = sent.is_certain or len(self.bindings.nodes) == 1
+            full_name = f'{type_name}{sent.part}'
+            for problem in find_problems(context.types, full_name, sent.value, sent.module):
+                if is_certain or (problem.help or '').startswith('did you mean'):
+                    yield problem
 
-def _check_parameters_needed(node: NodeSpec, reading: Reading) -> Iterator[Problem]:
-    """Check that parameters have a value where nothing asks whether they have one."""
-    if node.has_other_parameters or node.parameter_files:
-        return
-    for needed in reading.values_needed:
-        parameter = node.parameters.get(needed.name) if needed.of == 'parameters' else None
-        if parameter is not None and parameter.value is None and parameter.type is not None:
-            text = f"the parameter '{needed.name}' has no value until something sets it"
-            yield Problem('no-value', f'{text}: this may be None', needed.place, _ASK)
+    def _values_needed(self) -> Iterator[Problem]:
+        """Check what is unset at first, where nothing asks whether it has a value."""
+        node = self.node
+        is_open = self.binding.kind is None or any(each.is_state_open for _, each in self.readings)
+        early = {
+            name
+            for binding, reading in self.readings
+            for name in reading.state_set
+            if binding.kind is None or binding.behaviour.class_name
+        }
+        for needed in self.reading.values_needed:
+            text, name = '', needed.name
+            if needed.of == 'parameters':
+                parameter = node.parameters.get(name)
+                is_null = parameter is not None and parameter.value is None and parameter.type
+                if is_null and not (node.has_other_parameters or node.parameter_files):
+                    text = f"the parameter '{name}' has no value until something sets it: "
+                    text += 'this may be None'
+            elif node.state.get(name, '') is None and not (is_open or name in early):
+                told = f"'{name}' of the state is None until a behaviour sets it"
+                text = told if all(map(node.state.get, needed.held)) else ''
+            if text:
+                yield Problem('no-value', text, needed.place, _ASK)
 
+    def _unpublished(self) -> Iterator[Problem]:
+        """Check that what timers and subscriptions give is for something, or other functions."""
+        function = self.binding.behaviour.function
+        if not self.reading.unpublished or self.bindings.is_for_something:
+            return
+        for module in self.reading.modules.values():
+            for node in (inner for statement in module.body for inner in ast.walk(statement)):
+                match node:
+                    case ast.Name(id=name) | ast.Attribute(attr=name) | ast.alias(name=name):
+                        if name == function:
+                            return
+        text = f'nothing publishes this: {self.binding.owner} has no publish:'
+        advice = "write 'publish:' beside 'behaviour:', or node.publish here"
+        for place in self.reading.unpublished:
+            yield Problem('no-effect', text, place, advice)
 
-def _check_states_needed(
-    node: NodeSpec, binding: Binding, reading: Reading, readings: Readings
-) -> Iterator[Problem]:
-    """Check likewise names of the state that are null at first, and that no start sets."""
-    if binding.kind is None or any(each.is_state_open for _, each in readings):
-        return
-    early = {
-        name
-        for each, read in readings
-        for name in read.state_set
-        if each.kind is None or each.behaviour.class_name
-    }
-    for needed in reading.values_needed:
-        is_null = needed.of == 'state' and node.state.get(needed.name, '') is None
-        if is_null and needed.name not in early and all(map(node.state.get, needed.held)):
-            text = f"'{needed.name}' of the state is None until a behaviour sets it"
-            yield Problem('no-value', text, needed.place, _ASK)
-
-
-def _publishing_behaviours(context: CheckContext) -> set[str]:
-    """Return the behaviours of whose payloads something becomes somewhere."""
-    return {
-        binding.behaviour.name
-        for node in context.spec.nodes.values()
-        for binding in context.bindings(node)
-        if getattr(binding.entity, 'publish', None)
-        or binding.key.returned not in (None, PUBLISHED)
-    }
-
-
-def _check_unpublished(
-    context: CheckContext, readings: Readings, used: set[str]
-) -> Iterator[Diagnostic]:
-    """Check that what timers and subscriptions give is for something, or for other functions."""
-    for binding, reading in readings:
-        function = binding.behaviour.function
-        if not reading.unpublished or binding.behaviour.name in used:
-            continue
-        if any(_mentions(module, function) for module in reading.modules.values()):
-            continue
-        for place in reading.unpublished:
-            yield diagnostic_at(
-                place,
-                'no-effect',
-                f'nothing publishes this: {binding.owner} has no publish:',
-                help="write 'publish:' beside 'behaviour:', or node.publish here",
-                related=[bound_at(context, binding)],
-            )
-
-
-def _check_created(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
-    """Check the types of entities that behaviours create."""
-    for binding, reading in readings if context.catalogue.available else ():
-        for each in reading.created:
-            kind = KIND_OF_NOUN[each.kind].channel
-            if each.type is None or each.type_place is None or kind is None:
+    def _created(self) -> Iterator[Problem]:
+        """Check the types of entities that the behaviour creates."""
+        catalogue = self.context.catalogue
+        for created in self.reading.created:
+            kind = KIND_OF_NOUN[created.kind].channel
+            if created.type is None or created.type_place is None or kind is None:
                 continue
             wanted = cast('InterfaceKind', TYPE_FOLDERS[kind])
-            if re.fullmatch(rf'\w+/{wanted}/\w+', each.type) is None:
-                known = context.catalogue.names(wanted)
-                last = re.split(r'\W', each.type)[-1]
+            if re.fullmatch(rf'\w+/{wanted}/\w+', created.type) is None:
+                last = re.split(r'\W', created.type)[-1]
+                known = catalogue.names(wanted)
                 meant = [name for name in known if name.rpartition('/')[2] == last]
-                message, part = f"'{each.type}' is no {each.kind}'s type", each.type
+                message, part = f"'{created.type}' is no {created.kind}'s type", created.type
                 advice = did_you_mean(meant[0] if meant else None, f'write package/{wanted}/Name')
-            elif context.catalogue.has(each.type):
+            elif catalogue.has(created.type):
                 continue
             else:
-                message, part, advice = describe_missing_type(context, each.type)
-            yield diagnostic_at(
-                each.type_place.narrowed_to(part),
-                'unknown-type',
-                message,
-                help=advice,
-                related=[bound_at(context, binding)],
-            )
+                message, part, advice = describe_missing_type(self.context, created.type)
+            yield Problem('unknown-type', message, created.type_place.narrowed_to(part), advice)
 
+    def _state(self) -> Iterator[Problem]:
+        """Check the names of `node.state`: something has to set those that are read."""
+        node, readings = self.node, [reading for _, reading in self.readings]
+        if any(reading.is_state_open for reading in readings):
+            return
+        if self.context.was_dropped((*node.path, 'state')):
+            return
+        known = set(node.state).union(*(reading.state_set for reading in readings))
+        tested = set().union(*(reading.state_tested for reading in readings))
+        used = tested.union(*({use.name for use in each.state_read} for each in readings))
+        mentioned = self.context.behaviours.mentions(self.reading).attributes
+        for name, place in self.reading.state_set.items():
+            near = find_nearest(name, node.state)
+            # One that is set for nobody may be meant to be a declared one.
+            if near and is_typo(name, near) and name not in {*node.state, *used, *mentioned}:
+                text = f"'{name}' is set in the state, and nothing reads it"
+                yield Problem('unknown-state', text, place, f"did you mean '{near}'?")
+        for use in self.reading.state_read:
+            is_guarded = use.is_guarded and find_nearest(use.name, known) is None
+            if use.name not in known and use.name not in tested and not is_guarded:
+                text = f"neither 'state:' of node '{node.name}' nor a behaviour sets '{use.name}'"
+                advice = suggest(use.name, known, 'there are', "declare it under 'state:'")
+                yield Problem('unknown-state', text, use.place, advice)
 
-def _mentions(module: ModuleSource, function: str) -> bool:
-    """Return whether the code of a module uses a function."""
-    for node in (each for statement in module.body for each in ast.walk(statement)):
-        match node:
-            case ast.Name(id=name) | ast.Attribute(attr=name) | ast.alias(name=name):
-                if name == function:
-                    return True
-    return False
+    def _own_state(self) -> Iterator[Problem]:
+        """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
+        owner = self.binding.own_state_of
+        own = [reading for binding, reading in self.readings if binding.own_state_of == owner]
+        known = set().union(*(reading.own_state_set for reading in own))
+        is_open = any(reading.is_own_state_open for reading in own)
+        for use in () if is_open else self.reading.own_state_read:
+            if use.name not in known and not use.is_guarded:
+                text = f"nothing sets '{use.name}' in the own_state of {self.binding.owner}"
+                advice = suggest(use.name, known, 'there are', 'set it first, or read it by get')
+                yield Problem('unknown-state', text, use.place, advice)
 
-
-def _check_state(
-    context: CheckContext, node: NodeSpec, readings: Readings
-) -> Iterator[Diagnostic]:
-    """Check the names of `node.state` that are read: something has to set them."""
-    if any(reading.is_state_open for _, reading in readings):
-        return
-    if context.was_dropped((*node.path, 'state')):
-        return
-    known = set(node.state).union(*(reading.state_set for _, reading in readings))
-    tested = set().union(*(reading.state_tested for _, reading in readings))
-    used = tested.union(*({use.name for use in reading.state_read} for _, reading in readings))
-    for binding, reading in readings:
-        yield from _check_stored(context, node, (binding, reading), used)
-        for use in reading.state_read:
-            if use.name in known or use.name in tested:
-                continue
-            if use.is_guarded and find_nearest(use.name, known) is None:
-                continue
-            yield diagnostic_at(
-                use.place,
-                'unknown-state',
-                f"neither 'state:' of node '{node.name}' nor a behaviour sets '{use.name}'",
-                help=suggest(use.name, known, 'there are', "declare it under 'state:'"),
-                related=[bound_at(context, binding)],
-            )
-
-
-def _check_stored(
-    context: CheckContext, node: NodeSpec, bound: tuple[Binding, Reading], used: set[str]
-) -> Iterator[Diagnostic]:
-    """Check names of `node.state` that are set for nobody: declared ones may be meant."""
-    binding, reading = bound
-    mentioned = context.behaviours.mentions(reading).attributes
-    for name, place in reading.state_set.items():
-        near = find_nearest(name, node.state)
-        if name in node.state or name in used or near is None or not is_typo(name, near):
-            continue
-        if name not in mentioned:
-            yield diagnostic_at(
-                place,
-                'unknown-state',
-                f"'{name}' is set in the state, and nothing reads it",
-                help=f"did you mean '{near}'?",
-                related=[bound_at(context, binding)],
-            )
-
-
-def _check_own_state(context: CheckContext, readings: Readings) -> Iterator[Diagnostic]:
-    """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
-    for owner in dict.fromkeys(binding.own_state_of for binding, _ in readings):
-        own = [each for each in readings if each[0].own_state_of == owner]
-        if any(reading.is_own_state_open for _, reading in own):
-            continue
-        known = set().union(*(reading.own_state_set for _, reading in own))
-        for binding, reading in own:
-            for use in reading.own_state_read:
-                if use.name in known or use.is_guarded:
-                    continue
-                yield diagnostic_at(
-                    use.place,
-                    'unknown-state',
-                    f"nothing sets '{use.name}' in the own_state of {binding.owner}",
-                    help=suggest(use.name, known, 'there are', 'set it first, or read it by get'),
-                    related=[bound_at(context, binding)],
-                )
-
-
-def _check_remote_parameters(
-    context: CheckContext, node: NodeSpec, readings: Readings
-) -> Iterator[Diagnostic]:
-    """Check parameters that are set or read by name, of nodes of this system."""
-    for binding, reading in readings:
-        for each in reading.remote_parameters:
-            target = _node_of_name(context, node, each.node)
-            if target is None:
-                yield from _explain_unknown_node(context, node, binding, each)
-            elif target.before_parameters_set is not None:
-                continue  # Nobody knows what it makes of it.
-            elif parameter := target.parameters.get(each.name):
-                yield from _explain_refusal(context, binding, each, parameter)
-            elif each.name not in OF_EVERY_NODE and not _may_have_others(context, target):
-                yield diagnostic_at(
-                    each.place,
-                    'unknown-parameter',
-                    f"node '{target.name}' declares no parameter '{each.name}'",
-                    help=suggest(each.name, target.parameters, 'it declares'),
-                    related=[bound_at(context, binding)],
-                )
-
-
-def _explain_unknown_node(
-    context: CheckContext, node: NodeSpec, binding: Binding, each: RemoteParameter
-) -> Iterator[Diagnostic]:
-    """Report a node that this system may have under another name; others may be elsewhere."""
-    names = {other.full_name for other in context.spec.nodes.values()}
-    meant = _full_name(node, each.node)
-    same = sorted(name for name in names if name.rpartition('/')[2] == meant.rpartition('/')[2])
-    nearest = same[0] if same else find_nearest(meant, names)
-    if nearest and not same and not is_typo(meant, nearest):
-        return
-    if nearest is not None and not _is_in_process(context, meant):
-        yield diagnostic_at(
-            each.node_place,
-            'unknown-node',
-            f"there is no node '{meant}' in this system",
-            help=f"did you mean '{nearest}'?",
-            related=[bound_at(context, binding)],
+    def _remote_parameter(self, remote: RemoteParameter) -> Iterator[Problem]:
+        """Check a parameter that is set or read by name, of a node of this system."""
+        context, name = self.context, remote.node
+        meant = name if name.startswith('/') else join_names(self.node.namespace, name)
+        nodes = {node.full_name: node for node in context.spec.nodes.values()}
+        target = nodes.get(meant)
+        if target is None:
+            yield from self._unknown_node(remote, meant, [*nodes])
+            return
+        parameter = target.parameters.get(remote.name)
+        is_open = target.has_other_parameters or any(
+            reading.reaches_ros for reading in context.readings(target)
         )
+        if target.before_parameters_set is not None:
+            return  # Nobody knows what it makes of it.
+        if parameter is None and remote.name not in OF_EVERY_NODE and not is_open:
+            text = f"node '{target.name}' declares no parameter '{remote.name}'"
+            advice = suggest(remote.name, target.parameters, 'it declares')
+            yield Problem('unknown-parameter', text, remote.place, advice)
+        elif parameter is not None and (value := remote.value) is not None:
+            reason = parameter.type and find_type_problem(value, parameter.type)
+            reason = reason or (find_refusal(parameter, value) if parameter.type else None)
+            if reason := 'it is read-only' if parameter.read_only else reason:
+                text = f"parameter '{remote.name}' of node '{name}' refuses this: {reason}"
+                related = (context.related(parameter.path, 'it is declared here'),)
+                place = remote.value_place
+                yield Problem('refused-parameter', text, place, None, related)
 
-
-def _is_in_process(context: CheckContext, full_name: str) -> bool:
-    """Return whether an external process may have a node of this name."""
-    return any(
-        process.node_name in (None, full_name.rpartition('/')[2])
-        and (process.node_name or process.name) == full_name.rpartition('/')[2]
-        for process in context.spec.processes.values()
-    )
-
-
-def _explain_refusal(
-    context: CheckContext, binding: Binding, each: RemoteParameter, parameter: ParameterSpec
-) -> Iterator[Diagnostic]:
-    """Report a value that the node refuses."""
-    reason = None
-    if each.value is not None and parameter.type:
-        value = each.value
-        reason = find_type_problem(value, parameter.type) or find_refusal(parameter, value)
-    if parameter.read_only and each.value is not None:
-        reason = 'it is read-only'
-    if reason is not None:
-        yield diagnostic_at(
-            each.value_place,
-            'refused-parameter',
-            f"parameter '{each.name}' of node '{each.node}' refuses this: {reason}",
-            related=[
-                bound_at(context, binding),
-                context.related(parameter.path, 'it is declared here'),
-            ],
-        )
-
-
-def _full_name(node: NodeSpec, name: str) -> str:
-    return name if name.startswith('/') else join_names(node.namespace, name)
-
-
-def _node_of_name(context: CheckContext, node: NodeSpec, name: str) -> NodeSpec | None:
-    """Return the node that a name means, as `node.set_parameters` takes it."""
-    full_name = _full_name(node, name)
-    nodes = context.spec.nodes.values()
-    return next((each for each in nodes if each.full_name == full_name), None)
-
-
-def _may_have_others(context: CheckContext, node: NodeSpec) -> bool:
-    return node.has_other_parameters or any(each.reaches_ros for each in context.readings(node))
+    def _unknown_node(
+        self, remote: RemoteParameter, meant: str, names: list[str]
+    ) -> Iterator[Problem]:
+        """Report a node that the system may have under another name; others may be elsewhere."""
+        last = meant.rpartition('/')[2]
+        same = sorted(name for name in names if name.rpartition('/')[2] == last)
+        nearest = same[0] if same else find_nearest(meant, names)
+        # An external process may have a node of this name.
+        processes = self.context.spec.processes.values()
+        is_elsewhere = any((process.node_name or process.name) == last for process in processes)
+        if nearest and not is_elsewhere and (same or is_typo(meant, nearest)):
+            text = f"there is no node '{meant}' in this system"
+            place = remote.node_place
+            yield Problem('unknown-node', text, place, f"did you mean '{nearest}'?")

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, get_args
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
-from composer.python_source.top_names import TopNames
 from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 
@@ -125,7 +124,7 @@ def _check_source(
             places = _places_of(module, function)
             yield found.with_related(Related('it is defined here', at) for at in places)
         yield from _check_constructor(context, behaviour, module)
-    elif not (module.is_open or TopNames(module.body).is_dynamic):
+    elif not (module.is_open or module.top.is_dynamic):
         yield _explain_missing_function(context, binding, module)
 
 

@@ -17,8 +17,7 @@ from composer.checks.behaviours.missing_names import KINDS, Library
 from composer.diagnostics import Span, diagnostic_at
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
-from composer.python_source.places import span_of
-from composer.python_source.top_names import TopNames
+from composer.python_source.syntax import home_of
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, suggest
 
@@ -101,8 +100,9 @@ class _Walk:
             if isinstance(module, ModuleSource) and module.path is not None:
                 importer = _Importer(each, module, binding)
                 self.importers.append(importer)
-                for statement in module.required:
-                    pending += self._check(statement, importer)
+                for statement in module.body:
+                    if isinstance(statement, _Import):
+                        pending += self._check(statement, importer)
 
     def visit_function(self, binding: Binding) -> None:
         """Check the imports with which a behaviour begins."""
@@ -132,7 +132,7 @@ class _Walk:
             return [alias.name for alias in statement.names]
         written = '.' * statement.level + (statement.module or '')
         place = importer.source.place_of(statement.lineno).narrowed_to(written, first=True)
-        home = _resolve(statement, importer)
+        home = home_of(statement, importer.name, is_package=importer.source.is_package)
         if not home:
             message = f"'{importer.name}' is in no package that '{'.' * statement.level}' means"
             self._report(message, 'import it by its full name', importer, place)
@@ -204,7 +204,7 @@ class _Walk:
         elif not (source.is_open or source.syntax_error or alias.name in known):
             # It may be bound where nobody looks, unless it is only misspelt.
             nearest = find_nearest(alias.name, known)
-            top = TopNames(source.body)
+            top = source.top
             bound = top.statements.keys() | top.stored_again
             is_bound = top.is_open or alias.name in bound or alias.name[:2] == '__'
             if not top.is_dynamic and (nearest or not is_bound):
@@ -228,22 +228,10 @@ def _is_of_python(name: str) -> bool:
 def _place_of(node: ast.Attribute | ast.alias, source: ModuleSource) -> Span:
     if isinstance(node, ast.alias):
         return _place_of_name(node, source)
-    return span_of(source, node)
+    return source.span_of(node)
 
 
 def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:
     line = source.place_of(alias.lineno)
     column = len(line.source.line(alias.lineno).encode()[: alias.col_offset].decode()) + 1
     return Span(line.source, alias.lineno, column, len(alias.name))
-
-
-def _resolve(statement: ast.ImportFrom, importer: _Importer) -> str | None:
-    """Return the full name of the module that names are imported from, `None` if there is none."""
-    if not statement.level:
-        return statement.module
-    path = importer.source.path
-    is_package = path is not None and path.name == '__init__.py'
-    parts = importer.name.split('.')
-    package = parts[: max(0, len(parts) - statement.level + is_package)]
-    inner = [statement.module] if statement.module else []
-    return '.'.join([*package, *inner]) if package else None

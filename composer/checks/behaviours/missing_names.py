@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from composer.interfaces.message_types import PARTS, in_python
 from composer.python_source.annotations import dotted_name, find_interface
 from composer.python_source.modules import ModuleSource
-from composer.python_source.syntax import list_nodes
+from composer.python_source.syntax import bound_names, imported_names, list_nodes, words_in
 from composer.records import record
 from composer.spelling import find_nearest, suggest
 
@@ -192,30 +192,9 @@ def _imports_of(nodes: Iterable[ast.AST]) -> dict[str, str]:
     """Return the full names of what imports store, of names that nothing else stores."""
     found: dict[str, set[str]] = {}
     for node in nodes:
-        match node:
-            case ast.Import():
-                for alias in node.names:
-                    first = alias.name.partition('.')[0]
-                    meant = alias.name if alias.asname else first
-                    found.setdefault(alias.asname or first, set()).add(meant)
-            case ast.ImportFrom(module=str(home), level=0):
-                for alias in node.names:
-                    meant = f'{home}.{alias.name}'
-                    found.setdefault(alias.asname or alias.name, set()).add(meant)
-            case ast.ImportFrom():
-                for alias in node.names:
-                    found.setdefault(alias.asname or alias.name, set()).add('')
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
-                found.setdefault(name, set()).add('')
-            case (
-                ast.FunctionDef(name=name)
-                | ast.AsyncFunctionDef(name=name)
-                | ast.ClassDef(name=name)
-                | ast.ExceptHandler(name=str(name))
-                | ast.MatchAs(name=str(name))
-                | ast.MatchStar(name=str(name))
-            ):
-                found.setdefault(name, set()).add('')
+        names = dict(imported_names(node))
+        for name in bound_names(node):
+            found.setdefault(name, set()).add(names.get(name, ''))
     return {name: min(full) for name, full in found.items() if len(full) == 1 and min(full)}
 
 
@@ -225,16 +204,10 @@ def _asked_first(nodes: Iterable[ast.AST]) -> Iterator[ast.AST]:
         match node:
             case ast.Try() | ast.TryStar():
                 types = [each.type for each in node.handlers]
-                if None in types or _words(types) & _CATCHING:
+                if None in types or words_in(*types) & _CATCHING:
                     yield from list_nodes(node.body)
             case ast.If() | ast.IfExp() | ast.While():
-                if _words([node.test]) & _ASKING:
+                if words_in(node.test) & _ASKING:
                     yield from ast.walk(node)
-            case ast.BoolOp() if _words(node.values) & _ASKING:
+            case ast.BoolOp() if words_in(*node.values) & _ASKING:
                 yield from ast.walk(node)
-
-
-def _words(nodes: Iterable[ast.AST | None]) -> set[str]:
-    """Return the names and attributes in some expressions."""
-    every = [inner for node in nodes if node is not None for inner in ast.walk(node)]
-    return {str(getattr(each, 'id', None) or getattr(each, 'attr', '')) for each in every}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from composer.entity_kinds import PUBLISHED
 from composer.language.bindings import node_bindings
-from composer.python_source.local_names import list_arguments
+from composer.python_source.syntax import list_arguments
 from composer.stubs.project_modules import all_nodes
 
 if TYPE_CHECKING:
