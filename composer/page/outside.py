@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from composer.names import join_names
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable
 
 _MOST_ENDS = 50
 _LONGEST_NAME = 200
@@ -19,7 +19,8 @@ class OutsideEnds:
     """Compares the ends that the ROS graph has with the nodes of a system.
 
     Attributes:
-        by_topic: `kind`, `node` and `type` of each end, by the full names of topics.
+        by_topic: `kind`, `node` and `type` of each end, by the full names of topics; where no
+            message can go, `problem`, and the node of the system that has it, `problem_at`.
     """
 
     def __init__(self) -> None:
@@ -54,14 +55,40 @@ class OutsideEnds:
 
 
 def _list_ends(node: Any, topic: str, own: Collection[str]) -> list[dict[str, str]]:
+    publishers = _name_ends(node.get_publishers_info_by_topic(topic))
+    subscriptions = _name_ends(node.get_subscriptions_info_by_topic(topic))
     found = [
-        {'kind': kind, 'node': name[:_LONGEST_NAME], 'type': end.topic_type[:_LONGEST_NAME]}
-        for kind, ends in (
-            ('publisher', node.get_publishers_info_by_topic(topic)),
-            ('subscription', node.get_subscriptions_info_by_topic(topic)),
+        {
+            'kind': kind,
+            'node': name[:_LONGEST_NAME],
+            'type': end.topic_type[:_LONGEST_NAME],
+            **_find_problem(topic, name, end, [each for each in others if each[0] in own]),
+        }
+        for kind, ends, others in (
+            ('publisher', publishers, subscriptions),
+            ('subscription', subscriptions, publishers),
         )
-        for end in ends
-        if (name := join_names(end.node_namespace, end.node_name)) not in own
-        and not end.node_name.startswith(_UNSHOWN)
+        for name, end in ends
+        if name not in own and not end.node_name.startswith(_UNSHOWN)
     ]
     return sorted(found, key=lambda end: (end['kind'], end['node'], end['type']))[:_MOST_ENDS]
+
+
+def _name_ends(ends: Iterable[Any]) -> list[tuple[str, Any]]:
+    return [(join_names(each.node_namespace, each.node_name), each) for each in ends]
+
+
+def _find_problem(
+    topic: str, name: str, end: Any, own: Iterable[tuple[str, Any]]
+) -> dict[str, str]:
+    """Return why no message goes between an end outside and one of the system, and which."""
+    from composer.runtime.health.unmatched import find_mismatch
+    from composer.runtime.messages.qos_profiles import read_policies
+
+    for node, here in own:
+        publishes = here.endpoint_type.name == 'PUBLISHER'
+        policies = read_policies(here.qos_profile)
+        if reason := find_mismatch(end, here.topic_type, policies, publishes=publishes):
+            what = 'sends nothing to' if publishes else 'gets nothing from'
+            return {'problem': f'{topic} of {node} {what} {name}: {reason}', 'problem_at': node}
+    return {}

@@ -674,7 +674,7 @@ function showLive() {
   const outside = part?.kind === 'topic' ? listOutside(part.id.slice(6)) : [];
   if (!found.length) { live.replaceChildren(...outside); return; }
   const table = make('table');
-  const titles = ['Hz', '', 'mean ms', 'p99 ms', 'core %', 'queue', 'drops', 'late', 'errors'];
+  const titles = ['Hz', '', 'ms', 'p99', 'core %', 'queue', 'drops', 'late', 'errors'];
   const header = make('tr');
   for (const title of titles) header.append(make('th', title));
   table.append(header);

@@ -5,15 +5,32 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 _ORDER = {'error': 0, 'stale': 1, 'warn': 2, 'warning': 2}
 _MOST = 200
+_MS_PER_SEC = 1000
 
 
-def list_problems(status: dict[str, Any], health: dict[str, Any]) -> list[dict[str, str]]:
-    """Return problems as the page lists them: `level`, `text` and `node`, which may be empty."""
-    found = [*_of_status(status), *_of_processes(health), *_of_entities(health)]
+def list_problems(
+    status: dict[str, Any],
+    health: dict[str, Any],
+    outside: Mapping[str, list[dict[str, str]]],
+    topics: Mapping[str, str],
+) -> list[dict[str, str]]:
+    """Return problems as the page lists them: `level`, `text` and `node`, which may be empty.
+
+    Args:
+        outside: See `OutsideEnds`.
+        topics: The topic of each publisher and subscription, by its kind, node and name.
+    """
+    found = [*_of_status(status), *_of_processes(health), *_of_entities(health, topics)]
+    found += [
+        _problem('warn', end['problem'], end['problem_at'])
+        for ends in outside.values()
+        for end in ends
+        if 'problem' in end
+    ]
     return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))[:_MOST]
 
 
@@ -40,14 +57,25 @@ def _of_processes(health: dict[str, Any]) -> Iterator[dict[str, str]]:
             yield _problem('warn', f"process '{process['name']}' was restarted {times}")
 
 
-def _of_entities(health: dict[str, Any]) -> Iterator[dict[str, str]]:
-    for row in health.get('entities', ()):
+def _of_entities(health: dict[str, Any], topics: Mapping[str, str]) -> Iterator[dict[str, str]]:
+    rows = health.get('entities', ())
+    publishers = [row for row in rows if row['kind'] == 'publisher' and row['rate_hz']]
+    for row in rows:
         name = f'{row["kind"]} {row["name"]} of {row["node"]}'
         level = str(row.get('level', 'ok'))
-        if level != 'ok':
-            yield _problem(level, f'{name}: {row.get("message", level)}', row['node'])
-        elif row['errors']:
-            text = f'{name}: {row["errors"]:g} errors since the start'
-            yield _problem('warn', text, row['node'])
-        elif row['dropped']:
-            yield _problem('warn', f'{name}: {row["dropped"]:g} messages dropped', row['node'])
+        drops = f'{row["dropped"]:g} messages dropped' if row['dropped'] else ''
+        text = f'{row["errors"]:g} errors since the start' if row['errors'] else drops
+        text = row.get('message', level) if level != 'ok' else text
+        if drops and (topic := topics.get(_key(row))):
+            sent = [each for each in publishers if topics.get(_key(each)) == topic]
+            text += ''.join(f'; {each["node"]} publishes {each["rate_hz"]:.3g}/s' for each in sent)
+            # Else something else keeps it waiting.
+            if sum(each['rate_hz'] for each in sent) * (row['mean_ms'] or 0.0) > _MS_PER_SEC:
+                text += f', and each takes {row["mean_ms"]:.3g} ms'
+        if text:
+            yield _problem('warn' if level == 'ok' else level, f'{name}: {text}', row['node'])
+
+
+def _key(row: dict[str, Any]) -> str:
+    """Return what `Edge` has as its id."""
+    return f'{row["kind"]}:{row["node"]}:{row["name"]}'

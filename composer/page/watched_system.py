@@ -70,6 +70,7 @@ class Drawing:
         shown: See `describe_drawing`; nothing is folded.
         nodes: The full names of the nodes.
         topics: Those of the topics.
+        topic_of_ends: The topic of each publisher and subscription, by the ids of these.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
@@ -83,6 +84,7 @@ class Drawing:
         self.shown = describe_drawing(picture, code, direction=direction)
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
+        self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
         self._lock = threading.Lock()
         self._folded: dict[frozenset[str], dict[str, Any]] = {}
 
@@ -175,6 +177,7 @@ class WatchedSystem:
         self._rows: list[dict[str, Any]] = []
         # As the files say, without ends outside.
         self._declared: Drawing | None = None
+        self._topics: Mapping[str, str] = {}
         self._outside = OutsideEnds()
         self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
         self._ended = threading.Event()
@@ -251,7 +254,7 @@ class WatchedSystem:
                     'status': said,
                     'health': found,
                     'outside': self._outside.by_topic,
-                    'problems': list_problems(said, found),
+                    'problems': list_problems(said, found, self._outside.by_topic, self._topics),
                     'drawing': self.state.get('drawing', 0),
                     'drawing_problem': self.state.get('drawing_problem', ''),
                     'next': self._saved.next_plan,
@@ -285,6 +288,7 @@ class WatchedSystem:
             paths = [file, *(Path(each) for each in given['layers'])]
             self._saved.follow(RunningFiles(text, paths, given['words'], given['set_values']))
             self._declared = draw_files(paths, given['words'], given['set_values'])
+            self._topics = self._declared.topic_of_ends
         except (ComposerError, DrawingError) as error:
             # The page is for the same computer as the files, and shows the rest without.
             self._declared, problem = None, str(error)

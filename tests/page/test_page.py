@@ -19,6 +19,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('starlette')
 pytest.importorskip('uvicorn')
 
+from composer.page.problems import list_problems
 from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
@@ -254,6 +255,38 @@ def test_the_state_says_what_is_wrong_and_where(page):
     assert {row['node'] for row in state['health']['entities']} == {'/left/talker', '/ear'}
 
 
+def entity(kind, node, **figures):
+    none = dict.fromkeys(('rate_hz', 'mean_ms'))
+    row = {'kind': kind, 'node': node, 'name': 'scan', 'level': 'ok', 'errors': 0, 'dropped': 0}
+    return {**row, **none, **figures}
+
+
+@pytest.mark.parametrize(
+    ('figures', 'text'),
+    [
+        ({'errors': 3, 'mean_ms': 1.0}, '3 errors since the start'),
+        (
+            {'dropped': 4, 'mean_ms': 50.0},
+            '4 messages dropped; /a publishes 30/s, and each takes 50 ms',
+        ),
+        ({'dropped': 4, 'mean_ms': 1.0}, '4 messages dropped; /a publishes 30/s'),
+        (
+            {'dropped': 4, 'level': 'warn', 'message': '4 lost', 'mean_ms': 50.0},
+            '4 lost; /a publishes 30/s, and each takes 50 ms',
+        ),
+    ],
+)
+def test_drops_are_told_with_who_publishes_too_fast(figures, text):
+    rows = [
+        entity('publisher', '/a', rate_hz=30.0),
+        entity('publisher', '/other', rate_hz=99.0),
+        entity('subscription', '/b', **figures),
+    ]
+    topics = {f'{row["kind"]}:{row["node"]}:scan': row['node'] != '/other' for row in rows}
+    (problem,) = list_problems({}, {'entities': rows}, {}, topics)
+    assert problem == {'level': 'warn', 'text': f'subscription scan of /b: {text}', 'node': '/b'}
+
+
 def test_a_stream_tells_of_changes_and_bears_who_leaves(page):
     for _ in range(40):
         with page.stream() as states:
@@ -426,6 +459,8 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
 
 
 def test_ends_outside_appear_and_go(page, browser, shared_peer):
+    """It says why no message goes to one of them, and where."""
+    from rclpy.qos import qos_profile_sensor_data
     from std_msgs.msg import String
 
     def outside():
@@ -442,11 +477,15 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
     wait_for(lambda: outside() == {}, 'only ends of its own')
     assert not find('main svg .external, .outside')
     name = shared_peer.node.get_fully_qualified_name()
-    publisher = shared_peer.run(shared_peer.node.create_publisher, String, '/left/words', 1)
+    publisher = shared_peer.run(
+        shared_peer.node.create_publisher, String, '/left/words', qos_profile_sensor_data
+    )
     wait_for(lambda: find('main svg .external.node'), 'the publisher in the graph')
     for place in ('#live .outside', '#tree .outside'):
         wait_for(lambda place=place: name in text_of(place), place)
     assert outside() == {'/left/words': [('publisher', name)]}
+    wait_for(lambda: f'gets nothing from {name}: reliability: best' in text_of('#problems'), 'why')
+    assert page.json('/api/state')['outside']['/left/words'][0]['problem_at'] == '/ear'
     subscription = shared_peer.run(
         shared_peer.node.create_subscription, String, '/left/words', print, 1
     )

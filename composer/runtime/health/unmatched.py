@@ -109,7 +109,7 @@ class TopicEndpoint:
         policies = self._find_policies()
         for end in self._ends(publish=not self._publishes):
             name = f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-            reason = self._find_reason(end, policies)
+            reason = find_mismatch(end, self._spec.type, policies, publishes=self._publishes)
             if reason is None or end.node_name == _UNKNOWN_NAME:
                 continue
             found = True
@@ -156,16 +156,23 @@ class TopicEndpoint:
         text = f"{self.describe()} {what} '{name}': {reason}"
         self.ros.get_logger().warning(text)
 
-    def _find_reason(self, end: TopicEndpointInfo, here: Mapping[str, Any]) -> str | None:
-        """Return why another end cannot match this one, `None` if it can."""
-        if end.topic_type != self._spec.type:
-            return f'its type is {end.topic_type} there, and {self._spec.type} here'
-        there = read_policies(end.qos_profile)
-        offered, requested = (here, there) if self._publishes else (there, here)
-        conflicts = list(find_qos_conflicts(offered, requested))
-        if not conflicts:
-            return None
-        return describe_conflicts(conflicts, from_publisher=self._publishes)
+
+def find_mismatch(
+    end: TopicEndpointInfo, type_here: str, here: Mapping[str, Any], *, publishes: bool
+) -> str | None:
+    """Return why an end cannot match one here, `None` if it can.
+
+    Args:
+        type_here: The type of the message here.
+        here: The policies here, as `read_policies` returns them.
+        publishes: Whether the end here does.
+    """
+    if end.topic_type != type_here:
+        return f'its type is {end.topic_type} there, and {type_here} here'
+    there = read_policies(end.qos_profile)
+    offered, requested = (here, there) if publishes else (there, here)
+    conflicts = list(find_qos_conflicts(offered, requested))
+    return describe_conflicts(conflicts, from_publisher=publishes) if conflicts else None
 
 
 def _one_after_the_other(first: _OnEvent | None, second: _OnEvent) -> _OnEvent:
