@@ -172,6 +172,8 @@ class Run:
                 reading.open_all()
             case ('node', 'parameters') | ('changes',):
                 reading.open_kinds.add('parameter')
+            case ('node', 'publishers', *_):
+                reading.open_kinds.add('publisher')
             case ('node', 'state'):
                 reading.is_state_open = True
             case ('node', 'own_state'):

@@ -608,6 +608,8 @@ class Walk:
             case Chain(path=('node', 'parameters') | ('changes',) as path):
                 named = self._names.value_of(key, scope)
                 self.run.use('parameter', named, is_change=path == ('changes',))
+            case Chain(path=('node', 'publishers')):
+                self.run.use('publisher', self._names.value_of(key, scope))
             case Chain(path=('node', 'own_state')):
                 named = self._names.value_of(key, scope)
                 if not isinstance(named, Texts):
@@ -781,6 +783,14 @@ class Walk:
         self._call(value, scope, is_awaited=True)
 
     def _call(self, call: ast.Call, scope: Scope, *, is_awaited: bool = False) -> None:
+        match call.func:
+            case ast.Attribute(
+                value=ast.Subscript(value=publishers, slice=key), attr='publish'
+            ) if self._names.value_of(publishers, scope) == Chain(('node', 'publishers')):
+                # As `node.publish(key, …)`.
+                named = ast.Call(publishers, [key, *call.args], call.keywords)
+                self._call_node('publish', ast.copy_location(named, call), scope, is_awaited=False)
+                return
         func = self._names.value_of(call.func, scope)
         match func:
             case Chain():
@@ -882,6 +892,8 @@ class Walk:
                 named = self._names.value_of(call.args[0], scope) if call.args else None
                 has_default = len(call.args) + len(call.keywords) > 1 or owner == 'changes'
                 run.ask('parameter', named, has_default=has_default, is_change=owner == 'changes')
+            case ('node', 'publishers', *_):
+                run.escape(chain)
             case ('changes', *_):
                 run.reading.open_kinds.add('parameter')
             case ('node', 'own_state', method):

@@ -115,6 +115,20 @@ class End:
         self._creation.activate(self._section, self._name, is_active=is_active)
 
 
+class Publisher(End):
+    """A declared publisher, which may be kept; one that an edit creates again is the same."""
+
+    def __init__(
+        self, creation: EntityCreation, name: str, publish: Callable[[str, Payload], None]
+    ) -> None:
+        super().__init__(creation, 'publishers', name)
+        self._publish = publish
+
+    def publish(self, payload: Payload) -> None:
+        """Publish; see `Node.publish`."""
+        self._publish(self._name, payload)
+
+
 class Node:
     """A node, as its behaviours see it.
 
@@ -191,17 +205,16 @@ class Node:
         return not self.stopping.wait(seconds)
 
     @property
-    def publishers(self) -> Mapping[str, End]:
+    def publishers(self) -> Mapping[str, Publisher]:
         """Its declared publishers, by their names in the file."""
-        return self._ends('publishers')
+        creation, publish = self._creation, self.publish
+        return {name: Publisher(creation, name, publish) for name in self._entities['publishers']}
 
     @property
     def subscriptions(self) -> Mapping[str, End]:
         """Its declared subscriptions, by their names in the file."""
-        return self._ends('subscriptions')
-
-    def _ends(self, section: str) -> Mapping[str, End]:
-        return {name: End(self._creation, section, name) for name in self._entities[section]}
+        names = self._entities['subscriptions']
+        return {name: End(self._creation, 'subscriptions', name) for name in names}
 
     def publish(self, name: str, payload: Payload) -> None:
         """Publish on one of the node's declared publishers.

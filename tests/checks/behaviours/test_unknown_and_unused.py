@@ -28,10 +28,26 @@ def run(*lines, head='def run(node):'):
         "if node.parameters.speed > 2: node.publish('outt', 1)",
         "publish = node.publish; publish('outt', 1)",
         "node.now() or node.publish('outt', 1)",
+        "node.publishers['outt'].publish(1)",
+        "node.publishers['outt'].active = False",
     ],
 )
 def test_a_name_that_the_node_does_not_declare_is_a_finding(check, line):
     assert check(NODE, run(USES_ALL, line)) == [(3, 'unknown-publisher')]
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        "node.publishers['out'].publish('x')",
+        "send = node.publishers['out'].publish; send('x')",
+        "for each in node.publishers.values(): each.publish('x')",
+        "ends = node.publishers; ends['out'].publish('x')",
+    ],
+)
+def test_a_publisher_that_is_taken_is_used(check, line):
+    found = check(NODE, run(line))
+    assert 'unused-publisher' not in [rule for _, rule in found]
 
 
 def test_a_lambda_in_a_loop_uses_each_name(check):

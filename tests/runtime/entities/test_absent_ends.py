@@ -52,7 +52,7 @@ def look(node, event):
 
 def hear(node, message):
     node.state.made.publish(message)
-    node.publish('later', message)
+    node.publishers['later'].publish(message)
     return message
 
 def tell(node, message):
