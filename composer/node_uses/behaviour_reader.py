@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
 from composer.node_uses.names import Names, is_of_project
-from composer.node_uses.reading import Payload, Reading, missing_reading, unknown_reading
-from composer.node_uses.unread_code import Mentions, find_mentions
+from composer.node_uses.reading import (
+    SENDING_METHODS,
+    USED_NOUNS,
+    Payload,
+    Reading,
+    missing_reading,
+    unknown_reading,
+)
 from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
 from composer.node_uses.walk import TooLongError, Walk
 from composer.node_uses.wires import Wire, wire_of
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource, ModuleSource
 from composer.python_source.return_values import ends_without_value, never_returns
-from composer.python_source.syntax import list_arguments, own_nodes, positional_names
+from composer.python_source.syntax import (
+    list_arguments,
+    list_children,
+    own_nodes,
+    positional_names,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterator
 
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
@@ -33,6 +45,23 @@ _ANSWERS: dict[str, tuple[set[type], str]] = {
     'accept': ({bool, str, type(None)}, 'whether to accept, or why not'),
     'on_parameters': ({str, type(None)}, 'None, or why not'),
 }
+
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+
+
+@dataclass(slots=True)
+class Mentions:
+    """What code may use.
+
+    Attributes:
+        names: The names that it may use, of whatever kind.
+        open_kinds: The kinds of which it may use any.
+        attributes: Attributes of something that it names, and globals that it stores.
+    """
+
+    names: set[str] = field(default_factory=set)
+    open_kinds: set[str] = field(default_factory=set)
+    attributes: set[str] = field(default_factory=set)
 
 
 class BehaviourReader:
@@ -72,7 +101,7 @@ class BehaviourReader:
         found = Mentions()
         for key, module in reading.modules.items():
             if key not in self._mentions:
-                self._mentions[key] = find_mentions(module, self._followed)
+                self._mentions[key] = _find_mentions(module, self._followed)
             found.names |= self._mentions[key].names
             found.open_kinds |= self._mentions[key].open_kinds
             found.attributes |= self._mentions[key].attributes
@@ -263,3 +292,52 @@ def _type_of(value: ast.expr) -> type | None:
         case ast.JoinedStr():
             return str
     return None
+
+
+def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
+    """Return what the code of a module may use that was not followed.
+
+    Args:
+        followed: The functions that were, by their syntax trees.
+    """
+    found = Mentions()
+    plain: set[int] = set()
+    for node in _unread(module, followed):
+        if isinstance(node, ast.Attribute):
+            found.attributes.add(node.attr)
+        elif isinstance(node, ast.Global):
+            found.attributes.update(node.names)
+        match node:
+            case ast.Constant(value=str(text)):
+                found.names.add(text)
+            case ast.Attribute(value=ast.Attribute(attr='parameters') as parameters, attr=name):
+                plain.add(id(parameters))
+                found.names.add(name)
+            case ast.Subscript(
+                value=ast.Attribute(attr='parameters') as parameters, slice=ast.Constant()
+            ):
+                plain.add(id(parameters))
+            case ast.Attribute(attr='parameters') if id(node) not in plain:
+                found.open_kinds.add('parameter')
+            case ast.Call(func=ast.Attribute(attr=method), args=[name, *_]) if (
+                method in SENDING_METHODS
+            ):
+                if not isinstance(name, ast.Constant):
+                    found.open_kinds.add(SENDING_METHODS[method])
+            case ast.Call(func=ast.Name('exec' | 'eval')):
+                found.open_kinds |= USED_NOUNS
+    return found
+
+
+def _unread(module: ModuleSource, followed: Collection[int]) -> Iterator[ast.AST]:
+    """Yield the nodes of classes and of functions that were not followed."""
+    pending: list[tuple[ast.AST, bool]] = [(each, False) for each in module.body]
+    while pending:
+        node, is_unread = pending.pop()
+        if isinstance(node, _FUNCTIONS):
+            is_unread = id(node) not in followed
+        elif isinstance(node, ast.ClassDef):
+            is_unread = True
+        if is_unread:
+            yield node
+        pending += [(each, is_unread) for each in list_children(node)]

@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
-from composer.node_uses.literals import NotLiteralError, literal_of
+from composer.node_uses.message_uses import NotLiteralError, literal_of
 from composer.node_uses.reading import (
     CREATING_METHODS,
     SENDING_METHODS,

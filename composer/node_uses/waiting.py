@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
-from composer.node_uses.literals import number_of
+from composer.node_uses.message_uses import number_of
 from composer.node_uses.reading import Awaited, Block
 from composer.node_uses.values import Chain, External, Made
 from composer.python_source.syntax import own_nodes

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING, TypeGuard
+import importlib.util
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
 from composer.node_uses.reading import Awaited, MessageUse, NeededValue, Payload, StateUse
-from composer.node_uses.ros_members import ros_members
 from composer.node_uses.values import (
     Chain,
     Class,
@@ -22,6 +24,7 @@ from composer.node_uses.values import (
     Value,
 )
 from composer.python_source.annotations import find_interface
+from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import read_signature
 from composer.python_source.syntax import list_arguments, list_children, positional_names, words_in
 from composer.spelling import suggest
@@ -63,6 +66,7 @@ _OF_RCLPY = {
     'get_name': 'write node.name',
     'get_parameter': 'write node.parameters.NAME',
 }
+_CLASSES_OF_RCLPY = {'Node', 'LifecycleNodeMixin', 'LifecycleNode'}
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 # Functions that keep nothing of what they are given.
 _HARMLESS = frozenset(
@@ -271,8 +275,11 @@ class Walk:
                 self._else(node.orelse, scope)
             else:
                 self._block(node.orelse, scope)
-        held = self._state_name(node.test.operand, scope) if _is_not(node.test) else ''
-        self._doubt_rest(node, chosen, held)
+        match node.test:
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                self._doubt_rest(node, chosen, self._state_name(operand, scope))
+            case _:
+                self._doubt_rest(node, chosen)
 
     def _state_name(self, test: ast.expr, scope: Scope) -> str:
         """Return the name of `node.state` that is all of a test."""
@@ -343,13 +350,10 @@ class Walk:
             self._stored[id(target)] = value
             self.visit(target, scope)
         match targets, value:
-            case [ast.Name(id=name)], ast.Call(func=func) if self._is_coroutine(func, scope):
-                loads = [
-                    each
-                    for each in ast.walk(scope.definition or ast.Pass())
-                    if isinstance(each, ast.Name | ast.Global) and getattr(each, 'id', '') == name
-                ]
-                if len(loads) == 1 and scope.definition is not None:
+            case [ast.Name(id=name)], ast.Call(func=func):
+                nodes = ast.walk(scope.definition or ast.Pass())
+                is_alone = [getattr(each, 'id', '') for each in nodes].count(name) == 1
+                if is_alone and self._kind_of(func, scope) == 'coroutine':
                     text = f"'{name}' is a coroutine that is never awaited, so it never runs"
                     help_text = 'put await before it'
                     self.run.report('missing-await', scope.module, value, text, help_text)
@@ -377,10 +381,10 @@ class Walk:
             match self._names.value_of(node, scope):
                 case Chain(path=('node', name)) if name in node_calls.NODE_METHODS:
                     run.report('no-effect', module, node, 'this is not called', f'write {name}()')
-        elif isinstance(node, ast.Call) and self._is_coroutine(node.func, scope):
+        elif isinstance(node, ast.Call) and self._kind_of(node.func, scope) == 'coroutine':
             text = f"'{ast.unparse(node.func)}(…)' is never awaited, so it never runs"
             run.report('missing-await', module, node.func, text, 'put await before it')
-        elif isinstance(node, ast.Call) and self._is_generator(node.func, scope):
+        elif isinstance(node, ast.Call) and self._kind_of(node.func, scope) == 'generator':
             text = 'this makes a generator, and nothing goes through it'
             run.report('no-effect', module, node, text, "write 'yield from' before it")
         elif isinstance(node, ast.Call):
@@ -389,21 +393,17 @@ class Walk:
                     text = 'this thread is never started'
                     run.report('no-effect', module, node, text, 'write .start()')
 
-    def _is_coroutine(self, func: ast.expr, scope: Scope) -> bool:
+    def _kind_of(self, func: ast.expr, scope: Scope) -> str:
+        """Return what a call makes that does nothing by itself: a coroutine, or a generator."""
         match self._names.value_of(func, scope):
             case Chain(path=('node', 'call_async') | ('goal', _, 'result_async')):
-                return True
-            case Function(definition=ast.AsyncFunctionDef() as definition):
+                return 'coroutine'
+            case Function(definition=ast.FunctionDef() | ast.AsyncFunctionDef() as definition):
                 kind = self._names.kind_of(definition)
-                return kind is not None and not kind.is_generator
-        return False
-
-    def _is_generator(self, func: ast.expr, scope: Scope) -> bool:
-        match self._names.value_of(func, scope):
-            case Function(definition=ast.FunctionDef() as definition):
-                kind = self._names.kind_of(definition)
-                return kind is not None and kind.is_generator
-        return False
+                if kind is FunctionKind.COROUTINE:
+                    return 'coroutine'
+                return 'generator' if kind is FunctionKind.GENERATOR else ''
+        return ''
 
     # Conditions
 
@@ -732,7 +732,7 @@ class Walk:
         self, owner: str, name: str, known: frozenset[str], node: ast.expr, scope: Scope
     ) -> None:
         help_text = suggest(name, known, 'it has')
-        if owner == 'the node' and (name in _OF_RCLPY or name in ros_members()):
+        if owner == 'the node' and (name in _OF_RCLPY or name in _ros_members()):
             help_text = _OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
         text = f"{owner} has no attribute '{name}'"
         self.run.report('unknown-attribute', scope.module, node, text, help_text)
@@ -973,10 +973,6 @@ class Walk:
         return True
 
 
-def _is_not(test: ast.expr) -> TypeGuard[ast.UnaryOp]:
-    return isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
-
-
 def _operands(node: ast.Compare | ast.BinOp | ast.Call) -> list[ast.expr]:
     match node:
         case ast.Compare(left=left, comparators=others):
@@ -1027,3 +1023,21 @@ def _gives(definition: ast.AST) -> bool:
     return isinstance(definition, ast.Lambda) or any(
         isinstance(node, ast.Return | ast.Yield | ast.YieldFrom) for node in ast.walk(definition)
     )
+
+
+@cache
+def _ros_members() -> frozenset[str]:
+    """Return the names of the public methods and properties of `node.ros`; without rclpy, none."""
+    package = importlib.util.find_spec('rclpy')
+    names: set[str] = set()
+    for folder in package.submodule_search_locations or () if package else ():
+        for path in (Path(folder) / 'node.py', Path(folder) / 'lifecycle' / 'node.py'):
+            try:
+                tree = ast.parse(path.read_bytes())
+            except (OSError, SyntaxError):
+                return frozenset()
+            for of in tree.body:
+                if isinstance(of, ast.ClassDef) and of.name in _CLASSES_OF_RCLPY:
+                    methods = (each for each in of.body if isinstance(each, ast.FunctionDef))
+                    names |= {each.name for each in methods if each.name[0] != '_'}
+    return frozenset(names)

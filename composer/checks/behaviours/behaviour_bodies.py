@@ -14,8 +14,7 @@ from composer.checks.references import describe_missing_type
 from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import KIND_OF_NOUN, PUBLISHED, TYPE_FOLDERS
 from composer.names import join_names
-from composer.node_uses.literals import find_problems
-from composer.node_uses.message_uses import check_message_uses
+from composer.node_uses.message_uses import check_message_uses, find_problems
 from composer.node_uses.reading import Problem
 from composer.node_uses.wires import type_in
 from composer.records import record

@@ -16,7 +16,7 @@ from composer.entity_kinds import PUBLISHED
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource
 from composer.records import record
-from composer.stubs.checking.received_values import changed_names, payload_of
+from composer.stubs.checking.received_values import changed_names
 from composer.stubs.field_types import StubImports
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Annotator:
             return f'{self._imports.take("typing", "AsyncGenerator")}[{items}, {anything}]'
         generator = self._imports.take('typing', 'Generator')
         # A timer's generator only ends: what it returns means nothing.
-        is_timer = any(binding.kind and binding.kind.is_timed for _, binding in use.bindings)
+        is_timer = any(binding.kind and binding.kind.is_timed for binding, _ in use.bindings)
         ended = anything if is_timer else returned or anything
         return f'{generator}[{yielded or anything}, {anything}, {ended}]'
 
@@ -141,13 +141,12 @@ class Annotator:
         options: dict[str, None] = {}
         # Nothing is published where nothing is returned; a service needs its response.
         may_be_none = key == 'yielded'
-        for node, binding in use.bindings:
-            part = getattr(binding.key, key)
-            name = payload_of(node, binding, part)
+        for binding, wire in use.bindings:
+            name = getattr(wire, key)
             if name is None:
                 return None
             options[self._imports.payload(name)] = None
-            may_be_none |= part == PUBLISHED
+            may_be_none |= getattr(binding.key, key) == PUBLISHED
         return ' | '.join([*options, *(['None'] if may_be_none else [])])
 
 

@@ -10,6 +10,7 @@ import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from composer.python_source.syntax import count_characters, words_in
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -26,15 +27,8 @@ _TESTS = frozenset({'hasattr', 'isinstance', 'issubclass', 'callable', 'type'})
 # What a missing name raises, and what these errors are.
 _CAUGHT = frozenset(
     {
-        'AttributeError',
-        'BaseException',
-        'ComposerError',
-        'Exception',
-        'KeyError',
-        'LookupError',
-        'PayloadError',
-        'TypeError',
-        'UndeclaredError',
+        *('AttributeError', 'BaseException', 'ComposerError', 'Exception', 'KeyError'),
+        *('LookupError', 'PayloadError', 'TypeError', 'UndeclaredError'),
         'UndeclaredParameterError',
     }
 )
@@ -45,118 +39,34 @@ _OF_FILE = frozenset({'parameters', 'name'})
 
 
 @record
-class LeftAlone:
-    """Finds the syntax at places of a copy, and the places that are left alone."""
+class CopySyntax:
+    """The syntax of a copy, by its places in the original."""
 
     copy: AnnotatedCopy
-
-    def at(self, report: TypeReport) -> list[ast.AST]:
-        """Return the syntax nodes that begin where a report is, outermost first."""
-        column = self.copy.original_column(report.line, report.column)
-        return self._nodes.get((report.line, column), [])
-
-    def around(self, report: TypeReport) -> list[ast.AST]:
-        """Return the syntax nodes that a report is in, innermost first."""
-        found = self.at(report) or [
-            node
-            for (line, column), nodes in self._nodes.items()
-            for node in nodes
-            if (line, column) <= (report.line, self._column(report))
-            and (report.line, self._column(report)) <= self.end(node)
-        ]
-        if not found:
-            return []
-        # Of those that begin together, the inner ones come last.
-        _, _, node = max((self.start(each), index, each) for index, each in enumerate(found))
-        chain = [node]
-        while (above := self._parents.get(id(chain[-1]))) is not None:
-            chain.append(above)
-        return chain
 
     def start(self, node: ast.AST) -> tuple[int, int]:
         """Return the line and the column at which a statement or an expression begins."""
         line, offset = getattr(node, 'lineno', 1), getattr(node, 'col_offset', 0)
-        return line, self._characters(line, offset)
+        return line, self._column(line, offset)
 
     def end(self, node: ast.AST) -> tuple[int, int]:
         """Return the line and the column after the last character."""
         line, offset = getattr(node, 'end_lineno', 1), getattr(node, 'end_col_offset', 0)
-        return line, self._characters(line, offset)
+        return line, self._column(line, offset)
 
-    def lines(self, report: TypeReport) -> range:
-        """Return the lines of the statement that a report is in, or of its head."""
-        statement = next(
-            (each for each in self.around(report) if isinstance(each, ast.stmt)), None
-        )
-        if statement is None or hasattr(statement, 'body'):
-            return range(report.line, report.line + 1)
-        return range(statement.lineno, (statement.end_lineno or statement.lineno) + 1)
-
-    def is_left_alone(self, report: TypeReport) -> bool:
-        """Return whether what a report is about may be caught, asked for, or never come."""
-        chain = self.around(report)
-        if not chain or any(id(node) in self._guarded for node in chain):
-            return True
-        function = self.function(report)
-        names = {node.id for node in self._expression(chain) if isinstance(node, ast.Name)}
-        asked = self._asked_in(function) if function else frozenset()
-        return bool(names & asked) or any(map(_depends_on_file, _branches(chain)))
-
-    def depends_on_file(self, report: TypeReport) -> bool:
-        """Return whether a report comes after a branch that ends its function as the file says.
-
-        Of a branch with the report in it, `is_left_alone` knows.
-        """
-        function = self.function(report)
-        if function is None:
-            return True
-        extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
-        chain = self.around(report)
-        tests = {id(node) for node in chain} - {id(node) for node in _branches(chain)}
-        inside = {id(node) for node in _branches(chain)}
-        return any(
-            isinstance(node, _BRANCHES)
-            and self.start(node)[0] <= report.line
-            and (_depends_on_file(node) or extra & {*_names(*_test(node))})
-            and (id(node) in inside or (id(node) not in tests and _may_end(node)))
-            for node in ast.walk(function)
-        )
-
-    def function(self, report: TypeReport) -> FunctionNode | None:
-        """Return the function that a report is in."""
-        return next((node for node in self.around(report) if isinstance(node, _FUNCTIONS)), None)
-
-    def is_asked_for(self, name: str) -> bool:
-        """Return whether the module asks for an attribute or a key, or makes it."""
-        return name.startswith('_') or name in self._asked
-
-    def _column(self, report: TypeReport) -> int:
-        return self.copy.original_column(report.line, report.column)
-
-    def _characters(self, line: int, offset: int) -> int:
+    def _column(self, line: int, offset: int) -> int:
         lines = self.copy.module.source.lines
-        text = lines[line - 1] if line <= len(lines) else ''
-        return len(text.encode()[:offset].decode(errors='replace')) + 1
-
-    def _expression(self, chain: list[ast.AST]) -> Iterator[ast.AST]:
-        """Yield the parts of the statement that a report is in, or of the head of one."""
-        inner: ast.AST | None = None
-        for node in chain:
-            if isinstance(node, ast.stmt):
-                yield from ast.walk(inner if inner is not None and hasattr(node, 'body') else node)
-                return
-            inner = node
+        return count_characters(lines[line - 1] if line <= len(lines) else '', offset) + 1
 
     @cached_property
-    def _parents(self) -> dict[int, ast.AST]:
-        return {
-            id(child): node
-            for node in ast.walk(self.copy.module.tree)
-            for child in ast.iter_child_nodes(node)
-        }
+    def parents(self) -> dict[int, ast.AST]:
+        """What each syntax node is in, by the identity of the node."""
+        nodes = ast.walk(self.copy.module.tree)
+        return {id(child): node for node in nodes for child in ast.iter_child_nodes(node)}
 
     @cached_property
-    def _asked(self) -> frozenset[str]:
+    def asked(self) -> frozenset[str]:
+        """The attributes and keys that the module asks for, or makes."""
         return frozenset(
             argument.value
             for node in ast.walk(self.copy.module.tree)
@@ -165,7 +75,7 @@ class LeftAlone:
         )
 
     @cached_property
-    def _guarded(self) -> frozenset[int]:
+    def guarded(self) -> frozenset[int]:
         """The syntax nodes whose errors the module itself catches, or that may never run."""
         return frozenset(
             id(inner)
@@ -175,22 +85,111 @@ class LeftAlone:
         )
 
     @cached_property
-    def _nodes(self) -> dict[tuple[int, int], list[ast.AST]]:
+    def nodes(self) -> dict[tuple[int, int], list[ast.AST]]:
+        """The statements and expressions that begin at each place, outermost first."""
         places: dict[tuple[int, int], list[ast.AST]] = {}
         for node in ast.walk(self.copy.module.tree):
             if isinstance(node, ast.expr | ast.stmt):
                 places.setdefault(self.start(node), []).append(node)
         return places
 
-    def _asked_in(self, function: ast.AST) -> frozenset[str]:
-        """Return the names of which a function asks what they are."""
-        return frozenset(
+
+@record
+class ReportedPlace:
+    """The syntax at the place of a report, and whether it is left alone."""
+
+    syntax: CopySyntax
+    report: TypeReport
+
+    @cached_property
+    def _start(self) -> tuple[int, int]:
+        line = self.report.line
+        return line, self.syntax.copy.original_column(line, self.report.column)
+
+    @property
+    def nodes(self) -> list[ast.AST]:
+        """The syntax nodes that begin where the report is, outermost first."""
+        return self.syntax.nodes.get(self._start, [])
+
+    @property
+    def values(self) -> list[ast.expr]:
+        """The expressions that begin where the report is, outermost first."""
+        return [node for node in self.nodes if isinstance(node, ast.expr)]
+
+    @property
+    def calls(self) -> list[ast.Call]:
+        """The calls that the report is in, innermost first."""
+        return [node for node in self.around if isinstance(node, ast.Call)]
+
+    @cached_property
+    def around(self) -> list[ast.AST]:
+        """The syntax nodes that the report is in, innermost first."""
+        start, end = self.syntax.start, self.syntax.end
+        found = self.nodes or [
+            node
+            for place, nodes in self.syntax.nodes.items()
+            for node in nodes
+            if place <= self._start <= end(node)
+        ]
+        if not found:
+            return []
+        # Of those that begin together, the inner ones come last.
+        _, _, node = max((start(each), index, each) for index, each in enumerate(found))
+        chain = [node]
+        while (above := self.syntax.parents.get(id(chain[-1]))) is not None:
+            chain.append(above)
+        return chain
+
+    @property
+    def function(self) -> FunctionNode | None:
+        """The function that the report is in."""
+        return next((node for node in self.around if isinstance(node, _FUNCTIONS)), None)
+
+    @property
+    def lines(self) -> range:
+        """The lines of the statement that the report is in, or of its head."""
+        for node in self.around:
+            if isinstance(node, ast.stmt) and not hasattr(node, 'body'):
+                return range(node.lineno, (node.end_lineno or node.lineno) + 1)
+            if isinstance(node, ast.stmt):
+                break
+        return range(self.report.line, self.report.line + 1)
+
+    @property
+    def is_left_alone(self) -> bool:
+        """Whether what the report is about may be caught, asked for, or never come."""
+        chain, function = self.around, self.function
+        if not chain or any(id(node) in self.syntax.guarded for node in chain):
+            return True
+        asked = {
             name
+            for node in (ast.walk(function) if function else ())
+            if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in _TESTS
+            for name in words_in(*node.args)
+        }
+        inner = next((i for i, node in enumerate(chain) if isinstance(node, ast.stmt)), 0)
+        part = chain[max(0, inner - 1)] if hasattr(chain[inner], 'body') else chain[inner]
+        names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
+        return bool(names & asked) or any(map(_depends_on_file, _branches(chain)))
+
+    @property
+    def depends_on_file(self) -> bool:
+        """Whether the report comes after a branch that ends its function as the file says.
+
+        Of a branch with the report in it, `is_left_alone` knows.
+        """
+        function, chain = self.function, self.around
+        if function is None:
+            return True
+        extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
+        inside = {id(node) for node in _branches(chain)}
+        tests = {id(node) for node in chain} - inside
+        return any(
+            isinstance(node, _BRANCHES)
+            and self.syntax.start(node)[0] <= self.report.line
+            and (_depends_on_file(node) or extra & words_in(*_test(node)))
+            and (id(node) in inside or (id(node) not in tests and _may_end(node)))
             for node in ast.walk(function)
-            if isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id in _TESTS
-            for name in _names(*node.args)
         )
 
 
@@ -249,7 +248,7 @@ def _guarded_nodes(node: ast.AST) -> Iterator[ast.AST]:
         yield from node.body
     elif isinstance(node, ast.With | ast.AsyncWith):
         calls = [item.context_expr for item in node.items]
-        names = {name for call in calls if isinstance(call, ast.Call) for name in _names(call)}
+        names = words_in(*(call for call in calls if isinstance(call, ast.Call)))
         if names & {'suppress', 'raises'}:
             yield from node.body
     elif isinstance(node, ast.If) and _is_fixed(node.test):
@@ -270,13 +269,4 @@ def _is_fixed(test: ast.expr) -> bool:
 
 
 def _catches(handler: ast.ExceptHandler) -> bool:
-    return handler.type is None or bool(_CAUGHT & set(_names(handler.type)))
-
-
-def _names(*expressions: ast.AST) -> Iterator[str]:
-    for expression in expressions:
-        for node in ast.walk(expression):
-            if isinstance(node, ast.Name):
-                yield node.id
-            elif isinstance(node, ast.Attribute):
-                yield node.attr
+    return handler.type is None or bool(_CAUGHT & words_in(handler.type))

@@ -9,7 +9,6 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.entity_kinds import PUBLISHED
 from composer.language.bindings import node_bindings
 from composer.python_source.syntax import list_arguments
 from composer.stubs.project_modules import all_nodes
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.language.bindings import Binding
-    from composer.language.specs import NodeSpec
+    from composer.node_uses.wires import Wire
     from composer.python_source.syntax import FunctionNode
     from composer.stubs.project_modules import ProjectModule
 
@@ -62,13 +61,13 @@ class FunctionUse:
     Attributes:
         is_method: Whether its first parameter is the object.
         received: By parameter.
-        bindings: The nodes and places that it is bound to.
+        bindings: The places that it is bound to, with the types around it.
         is_called: Whether the project itself calls or passes it.
     """
 
     definition: FunctionNode
     received: dict[str, Received] = field(default_factory=dict)
-    bindings: list[tuple[NodeSpec, Binding]] = field(default_factory=list)
+    bindings: list[tuple[Binding, Wire]] = field(default_factory=list)
     is_called: bool = False
     is_method: bool = False
 
@@ -128,44 +127,21 @@ def changed_names(function: FunctionNode) -> set[str]:
     return names
 
 
-def message_given(binding: Binding) -> str | None:
-    """Return the full name of the message that a behaviour is called with."""
-    return None if getattr(binding.entity, 'raw', False) else _part_of(binding, binding.key.given)
-
-
-def payload_of(node: NodeSpec, binding: Binding, part: str | None) -> str | None:
-    """Return the full name of the message that a returned or yielded payload becomes.
-
-    Args:
-        part: As in `BehaviourKey.returned`.
-    """
-    if part != PUBLISHED:
-        return _part_of(binding, part)
-    publisher = node.publishers.get(getattr(binding.entity, 'publish', None) or '')
-    return publisher.type if publisher else None
-
-
-def _part_of(binding: Binding, part: str | None) -> str | None:
-    of_type: str | None = getattr(binding.entity, 'type', None)
-    if part is None or of_type is None:
-        return None
-    return f'{of_type}_{part}' if part else of_type
-
-
 def _give_bound(context: CheckContext, functions: Mapping[FunctionKey, FunctionUse]) -> None:
     for node in all_nodes(context):
         for binding in node_bindings(node):
             use = functions.get((binding.behaviour.module, binding.behaviour.function))
             if use is None:
                 continue
-            use.bindings.append((node, binding))
+            wire = context.behaviours.wire_of(node, binding)
+            use.bindings.append((binding, wire))
             own = Received(nodes={node.key: None})
             init = f'{binding.behaviour.class_name}.__init__'
             maker = functions.get((binding.behaviour.module, init))
             if maker is not None and maker.names():
                 maker.give(maker.names()[0], own)
-            given = message_given(binding)
-            messages = Received(messages={given: None}) if given else Received(is_open=True)
+            given = {wire.given: None} if wire.given else {}
+            messages = Received(messages=given, is_open=not given)
             for name, received in zip(use.names(), (own, messages), strict=False):
                 use.give(name, received)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator
-from composer.stubs.checking.left_alone import LeftAlone
+from composer.stubs.checking.left_alone import CopySyntax
 from composer.stubs.checking.received_values import find_received_values
 from composer.stubs.checking.type_checker import run_type_checker
 from composer.stubs.checking.type_findings import TypeFindings
@@ -78,10 +78,9 @@ def find_type_errors(
     )
     every, kept = [], []
     for path, copy in copies.items():
-        places = LeftAlone(copy)
         told = {*_lines_told(found, copy)}
         reports = [report for report in result.reports if report.path == path]
-        for finding, lines in findings.explain_all(places, reports):
+        for finding, lines in findings.explain_all(CopySyntax(copy), reports):
             every.append(finding)
             if not told & {*lines}:
                 told.add(lines[0])
