@@ -30,12 +30,12 @@ def test_a_rule_is_explained_with_its_examples(run):
     assert "help: did you mean 'heading'?" in out
 
 
-@pytest.mark.parametrize('rule', sorted(list_rule_names()))
-def test_every_rule_can_be_explained(run, rule):
-    code, out, err = run('explain', rule)
-    assert (code, err) == (0, '')
-    assert load_rule(rule).meaning in out
-    assert load_rule(rule).why in out
+def test_every_rule_can_be_explained(run):
+    for rule in sorted(list_rule_names()):
+        code, out, err = run('explain', rule)
+        assert (code, err) == (0, '')
+        assert load_rule(rule).meaning in out
+        assert load_rule(rule).why in out
 
 
 def test_without_a_rule_all_are_listed_by_family(run):
