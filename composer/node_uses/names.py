@@ -36,18 +36,14 @@ if TYPE_CHECKING:
     from composer.python_source.function_kinds import FunctionKind
     from composer.python_source.module_finder import ModuleFinder
 
-# The classes whose objects threads wait for, by the name of the class that waits alike.
-MADE = {
-    'threading.BoundedSemaphore': 'threading.Semaphore',
-    **{
-        name: name
-        for name in (
-            *(f'threading.{each}' for each in ('Barrier', 'Condition', 'Event', 'Lock')),
-            *('threading.Semaphore', 'threading.Thread', 'concurrent.futures.Future'),
-            *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
-        )
-    },
-}
+# The classes whose objects threads wait for.
+_MADE = frozenset(
+    {
+        *(f'threading.{each}' for each in ('Barrier', 'Condition', 'Event', 'Lock', 'Semaphore')),
+        *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
+        *('threading.Thread', 'concurrent.futures.Future'),
+    }
+)
 _INSTALLED = {'site-packages', 'dist-packages'}
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
@@ -336,8 +332,8 @@ class Names:
 
     def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
         match self.value_of(call.func, scope):
-            case External(name=name) if name in MADE:
-                return Made(MADE[name], scope.module, call)
+            case External(name=name) if (kind := name.replace('.Bounded', '.')) in _MADE:
+                return Made(kind, scope.module, call)
             case External(name=name) if (interface := find_interface(name)) is not None:
                 return Chain(('made', interface))
             case Class() as of:

@@ -13,17 +13,16 @@ from composer.python_source.syntax import own_nodes
 if TYPE_CHECKING:
     from composer.node_uses.current_run import Run
     from composer.node_uses.values import Scope
-    from composer.python_source.modules import ModuleSource
 
 _PUTTING = frozenset({'put', 'put_nowait'})
-_QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
+QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
 # The methods that wait for something, by the class; and those that bring it about.
 WAITING: dict[str, frozenset[str]] = {
     'threading.Event': frozenset({'wait'}),
     'threading.Condition': frozenset({'wait', 'wait_for'}),
     'threading.Barrier': frozenset({'wait'}),
     'threading.Semaphore': frozenset({'acquire'}),
-    **dict.fromkeys(_QUEUES, frozenset({'get'})),
+    **dict.fromkeys(QUEUES, frozenset({'get'})),
     'concurrent.futures.Future': frozenset({'result', 'exception'}),
 }
 FILLING: dict[str, frozenset[str]] = {
@@ -31,7 +30,7 @@ FILLING: dict[str, frozenset[str]] = {
     'threading.Condition': frozenset({'notify', 'notify_all'}),
     'threading.Barrier': frozenset({'wait', 'abort'}),
     'threading.Semaphore': frozenset({'release'}),
-    **dict.fromkeys(_QUEUES, _PUTTING),
+    **dict.fromkeys(QUEUES, _PUTTING),
     'concurrent.futures.Future': frozenset({'cancel', 'set_exception', 'set_result'}),
 }
 LOCK, THREAD = 'threading.Lock', 'threading.Thread'
@@ -44,8 +43,11 @@ _WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Awa
 
 def note_method(run: Run, owner: Made, call: ast.Call, name: str, scope: Scope) -> None:
     """Note a call of a method of something that threads wait for."""
-    if owner.kind == LOCK:
-        _note_lock(run, owner, call, name, scope)
+    if owner.kind == LOCK and name == 'acquire' and not (call.args or call.keywords):
+        take(run, owner, call, scope)
+        run.held_locks.append((owner, call.lineno))
+    elif owner.kind == LOCK and name in ('acquire', 'release'):
+        run.held_locks = [each for each in run.held_locks if each[0] != owner]
     elif owner.kind in WAITING:
         place = owner.module.span_of(owner.node)
         made_at = f'{place.source.name}:{place.line}:{place.column}'
@@ -96,14 +98,6 @@ def _is_timed(name: str, call: ast.Call) -> bool:
 # Locks
 
 
-def _note_lock(run: Run, lock: Made, call: ast.Call, name: str, scope: Scope) -> None:
-    if name == 'acquire' and not (call.args or call.keywords):
-        take(run, lock, call, scope)
-        run.held_locks.append((lock, call.lineno))
-    elif name in ('acquire', 'release'):
-        run.held_locks = [each for each in run.held_locks if each[0] != lock]
-
-
 def take(run: Run, lock: Made, node: ast.expr, scope: Scope) -> None:
     """Report that a lock is taken by who has it already."""
     line = next((line for each, line in run.held_locks if each == lock), None)
@@ -129,13 +123,13 @@ def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
         return node
     stored = run.names.stored_in(scope.definition).get(node.id) if scope.definition else None
     if stored is not None:
-        value, is_item = stored[0]
-        is_known = len(stored) == 1 and isinstance(value, ast.expr) and not is_item
-        return value if is_known and isinstance(value, ast.expr) else node
-    top = scope.module.top
-    match top.statements.get(node.id):
-        case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
-            return node if node.id in top.stored_again else value
+        match stored:
+            case [(ast.expr() as value, False)]:
+                return value
+    elif node.id not in scope.module.top.stored_again:
+        match scope.module.top.statements.get(node.id):
+            case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
+                return value
     return node
 
 
@@ -209,9 +203,7 @@ def _changed_name(run: Run, node: ast.Name | ast.Attribute, scope: Scope) -> Awa
         case Chain(path=('node', 'state', name)):
             # A name that it was copied to stays as it is.
             return Awaited('', 'state', name) if isinstance(node, ast.Attribute) else None
-    if not isinstance(node, ast.Name):
-        return None
-    return global_name(run, node.id, scope)
+    return global_name(run, node.id, scope) if isinstance(node, ast.Name) else None
 
 
 def global_name(run: Run, name: str, scope: Scope) -> Awaited | None:
@@ -221,8 +213,4 @@ def global_name(run: Run, name: str, scope: Scope) -> Awaited | None:
     )
     if is_own or name not in scope.module.top.stored_again:
         return None
-    return Awaited('', _path_of(scope.module), name)
-
-
-def _path_of(module: ModuleSource) -> str:
-    return str(module.path)
+    return Awaited('', str(scope.module.path), name)

@@ -223,7 +223,7 @@ class Walk:
                 self._else(node.orelse, scope)
             case ast.Match():
                 self.visit(node.subject, scope)
-                chosen = self._chosen_by([node.subject], scope)
+                chosen = self._chosen_by(node.subject, scope)
                 for case in node.cases:
                     with self.run.condition(chosen):
                         if case.guard is not None:
@@ -264,7 +264,7 @@ class Walk:
                 self.run.fill(what, scope)
 
     def _branch(self, node: ast.If | ast.While, scope: Scope) -> None:
-        chosen = self._chosen_by([node.test], scope)
+        chosen = self._chosen_by(node.test, scope)
         self.visit(node.test, scope)
         if isinstance(node, ast.While):
             waiting.note_loop(self.run, node, scope)
@@ -407,9 +407,9 @@ class Walk:
 
     # Conditions
 
-    def _chosen_by(self, tests: Sequence[ast.expr], scope: Scope) -> str:
+    def _chosen_by(self, test: ast.expr, scope: Scope) -> str:
         """Return what decides on a condition: `fixed`, `file`, `state`, or something else."""
-        return self._strongest(tests, scope, set()) or ''
+        return self._strongest([test], scope, set()) or ''
 
     def _strongest(self, nodes: Iterable[ast.AST], scope: Scope, seen: set[str]) -> str | None:
         """Return what decides on parts of which each may decide alone; `None` for constants."""
@@ -503,16 +503,11 @@ class Walk:
         match self._names.value_of(node, scope):
             case Chain(path=('node', 'parameters' | 'state' as of, name)):
                 run, full = self.run, f'{of}.{name}'
-                is_ready = run.guards or run.broad_guards or run.doubts
+                is_ready = bool(run.guards or run.broad_guards or run.doubts)
                 is_set = of == 'state' and name in run.reading.state_set
                 # A caller may have asked before.
-                asked = (self._asked_in(each) for each in (scope, *self._under_way))
-                if (
-                    name in _OF_MAPPING
-                    or is_ready
-                    or is_set
-                    or any(full in each for each in asked)
-                ):
+                is_ready |= any(full in self._asked_in(each) for each in (scope, *self._under_way))
+                if name in _OF_MAPPING or is_ready or is_set:
                     return
                 if of == 'parameters' or len(run.held_states) == run.state_doubts:
                     needed = NeededValue(of, name, scope.module.span_of(node), run.held_states)
@@ -541,12 +536,12 @@ class Walk:
                 self.enter(Function(scope.module, node, None, scope), {}, is_waited=False)
             case ast.IfExp(test=test, body=body, orelse=other):
                 self.visit(test, scope)
-                with self.run.condition(self._chosen_by([test], scope)):
+                with self.run.condition(self._chosen_by(test, scope)):
                     self.visit(body, scope)
                     self.visit(other, scope)
             case ast.BoolOp(values=[first, *rest]):
                 self.visit(first, scope)
-                with self.run.condition(self._chosen_by([first], scope)):
+                with self.run.condition(self._chosen_by(first, scope)):
                     for each in rest:
                         self.visit(each, scope)
             case ast.Compare():
@@ -566,18 +561,13 @@ class Walk:
 
     def _visit_name(self, node: ast.Name | ast.Attribute | ast.Subscript, scope: Scope) -> None:
         value = self._names.value_of(node, scope)
-        if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+        match node:
             # The name may stand for a part of the node from here on.
-            owner = (
-                self._names.value_of(node.value, scope)
-                if isinstance(node, ast.Attribute)
-                else None
-            )
-            value = (
-                self._names.attribute(owner, node.attr)
-                if isinstance(owner, Chain) and isinstance(node, ast.Attribute)
-                else None
-            )
+            case ast.Name(ctx=ast.Store()):
+                value = None
+            case ast.Attribute(value=inner, attr=name, ctx=ast.Store()):
+                owner = self._names.value_of(inner, scope)
+                value = Chain((*owner.path, name)) if isinstance(owner, Chain) else None
         if isinstance(value, Chain):
             self._use(value, node, scope)
             return
@@ -995,10 +985,8 @@ def _tests_in(definition: ast.AST) -> list[ast.AST]:
     found: list[ast.AST] = []
     for node in ast.walk(definition):
         match node:
-            case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
-                found.append(test)
-            case ast.Assert(test=test):
-                found.append(test)
+            case ast.If() | ast.IfExp() | ast.While() | ast.Assert():
+                found.append(node.test)
             case ast.BoolOp(values=values) | ast.comprehension(ifs=values):
                 found += values
             case ast.Match(subject=subject):

@@ -16,8 +16,7 @@ from composer.interfaces.descriptions import (
     FieldType,
     ServiceDescription,
 )
-from composer.stubs.message_stubs import list_messages, write_interfaces
-from composer.stubs.payload_stubs import write_payloads
+from composer.stubs.message_stubs import list_messages, write_interfaces, write_payloads
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

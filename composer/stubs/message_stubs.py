@@ -15,12 +15,12 @@ from composer.interfaces.descriptions import (
     MessageDescription,
     ServiceDescription,
 )
-from composer.stubs.field_types import FieldTypes, StubImports, is_writable
+from composer.stubs.field_types import PAYLOADS, FieldTypes, StubImports, is_writable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from composer.interfaces.descriptions import ConstantDescription, InterfaceDescription
+    from composer.interfaces.descriptions import InterfaceDescription
 
 _UUID = FieldDescription('goal_id', FieldType('message', 'unique_identifier_msgs/msg/UUID'))
 _TIME = FieldType('message', 'builtin_interfaces/msg/Time')
@@ -104,7 +104,7 @@ def _write_interface(
     name: str, interface: InterfaceDescription | None, imports: StubImports
 ) -> Iterator[str]:
     if interface is None:
-        yield from _write_unknown(name.rpartition('/')[2], imports)
+        yield from ('', f'{_last(name)}: {imports.take("typing", "Any")}')
         return
     for message in list_messages(interface):
         yield from _write_message(message, imports)
@@ -112,11 +112,6 @@ def _write_interface(
         yield from _write_service(interface.name, imports)
     elif isinstance(interface, ActionDescription):
         yield from _write_action(interface, imports)
-
-
-def _write_unknown(name: str, imports: StubImports) -> Iterator[str]:
-    anything = imports.take('typing', 'Any')
-    yield from ('', f'{name}: {anything}')
 
 
 def _write_message(message: MessageDescription, imports: StubImports) -> Iterator[str]:
@@ -127,9 +122,10 @@ def _write_message(message: MessageDescription, imports: StubImports) -> Iterato
     text, anything = types.word('str'), imports.take('typing', 'Any')
     yield from ('', f'class {_last(message.name)}:')
     if message.comment:
-        yield f'    {_quote(message.comment)}'
-    yield from _write_constants(message.constants, types)
+        yield f'    {" ".join(message.comment.split())!r}'
     of_class = imports.take('typing', 'ClassVar')
+    for constant in filter(lambda each: is_writable(each.name), message.constants):
+        yield f'    {constant.name}: {of_class}[{types.read(constant.type)}]'
     yield f'    SLOT_TYPES: {of_class}[tuple[{anything}, ...]]'
     yield '    def __init__('
     yield '        self,'
@@ -138,30 +134,15 @@ def _write_message(message: MessageDescription, imports: StubImports) -> Iterato
     yield f'        check_fields: {types.word("bool")} | None = ...,'
     yield '    ) -> None: ...'
     for field in fields:
-        yield from _write_property(field, types)
+        yield f'    @{types.word("property")}'
+        yield f'    def {field.name}(self) -> {types.read(field.type)}:'
+        yield f'        {" ".join(field.comment.split())!r}' if field.comment else '        ...'
+        yield f'    @{field.name}.setter'
+        yield f'    def {field.name}(self, value: {types.write(field.type)}) -> None: ...'
         if field.default is not None:
             yield f'    {field.name.upper()}__DEFAULT: {of_class}[{types.read(field.type)}]'
     yield '    @classmethod'
     yield f'    def get_fields_and_field_types(cls) -> dict[{text}, {text}]: ...'
-
-
-def _write_constants(constants: Iterable[ConstantDescription], types: FieldTypes) -> Iterator[str]:
-    of_class = types.imports.take('typing', 'ClassVar')
-    for constant in constants:
-        if is_writable(constant.name):
-            yield f'    {constant.name}: {of_class}[{types.read(constant.type)}]'
-
-
-def _write_property(field: FieldDescription, types: FieldTypes) -> Iterator[str]:
-    comment = f'        {_quote(field.comment)}' if field.comment else ''
-    decorator = types.word('property')
-    yield f'    @{decorator}'
-    end = '' if comment else ' ...'
-    yield f'    def {field.name}(self) -> {types.read(field.type)}:{end}'
-    if comment:
-        yield comment
-    yield f'    @{field.name}.setter'
-    yield f'    def {field.name}(self, value: {types.write(field.type)}) -> None: ...'
 
 
 def _write_service(name: str, imports: StubImports) -> Iterator[str]:
@@ -189,7 +170,39 @@ def _last(name: str) -> str:
     return name.rpartition('/')[2]
 
 
-def _quote(comment: str) -> str:
-    """Return a comment as a docstring."""
-    text = ' '.join(comment.split())
-    return repr(text)
+def write_payloads(package: str, messages: Iterable[MessageDescription]) -> Iterator[str]:
+    """Yield the lines of a stub with what may be given for a package's messages.
+
+    A payload is a message, a mapping of fields, or the bare value of a message with one field. A
+    mapping is a `TypedDict`: `Mapping[str, Any]` would take any key. So one that is built in steps
+    is declared as the `TypedDict`, or as `Any`.
+    """
+    imports = StubImports(f'{PAYLOADS}.{package}')
+    lines = [line for message in messages for line in _write_payload(message, imports)]
+    yield from imports.lines()
+    yield from lines
+
+
+def _write_payload(message: MessageDescription, imports: StubImports) -> Iterator[str]:
+    types = FieldTypes(imports, frozenset(field.name for field in message.fields))
+    last = _last(message.name)
+    message_class = imports.message(message.name)
+    # A mapping names the fields of the message itself, so a bare value for its one field is none.
+    values = [message_class, f'{imports.support("ToMsg")}[{message_class}]']
+    if not message.fields:
+        values.append('None')
+    if len(message.fields) == 1:
+        values.append(types.bare(message.fields[0].type))
+    alias = imports.take('typing', 'TypeAlias')
+    yield from ('', f'{last}Value: {alias} = {" | ".join(values)}')
+    if all(is_writable(field.name) for field in message.fields):
+        typed_dict = imports.take('typing', 'TypedDict')
+        yield f'class {last}Fields({typed_dict}, total=False):'
+        if not message.fields:
+            yield '    pass'
+        for field in message.fields:
+            yield f'    {field.name}: {types.payload(field.type)}'
+    else:
+        anything = imports.take('typing', 'Any')
+        yield f'{last}Fields: {alias} = {imports.take("typing", "Mapping")}[str, {anything}]'
+    yield f'{last}: {alias} = {last}Value | {last}Fields'

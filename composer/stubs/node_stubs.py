@@ -61,44 +61,34 @@ def _write_base(imports: StubImports, nodes: Iterable[NodeSpec]) -> Iterator[str
     known = _names_by_parameters([*nodes])
     anything, mapping = imports.take('typing', 'Any'), imports.take('typing', 'Mapping')
     of_dict, names_of = imports.take('typing', 'TypedDict'), imports.take('typing', 'Iterable')
-    getters, setters = [], []
+    # The names of nodes, those of parameters, the type of their values, and a decorator.
+    rows: list[tuple[str, str, str, str]] = []
     for number, (types, names) in enumerate(known.items()):
         fields = {name: _named(imports, ' | '.join(each)) for name, each in types}
         entries = ', '.join(f'{name!r}: {of_type}' for name, of_type in fields.items())
         yield from ('', f'_Values{number} = {of_dict}(')
         yield f"    '_Values{number}', {{{entries}}}, total=False"
         yield ')'
-        node_name = f'self, node_name: {_literal(imports, names)}'
-        getters.append(
-            f'    def get_parameters({node_name}, names: {names_of}[{_literal(imports, fields)}], '
-            f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
-        )
-        setters.append(
-            f'    def set_parameters({node_name}, values: _Values{number}, '
-            f'{_TIMEOUT}) -> None: ...'
-        )
+        literals = _literal(imports, names), _literal(imports, fields)
+        rows.append((*literals, f'_Values{number}', ''))
     if known:
         # Composer raises an error then. Names of other nodes, and computed ones, are not known.
-        literal = imports.take('typing', 'LiteralString')
+        literal, every = imports.take('typing', 'LiteralString'), chain(*known.values())
         decorator = f'    @{imports.take("typing_extensions", "deprecated")}({_NO_PARAMETER!r})\n'
-        node_name = f'self, node_name: {_literal(imports, chain(*known.values()))}'
-        getters.append(
-            f'{decorator}    def get_parameters({node_name}, names: {names_of}[{literal}], '
-            f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
-        )
-        setters.append(
-            f'{decorator}    def set_parameters({node_name}, values: {mapping}[{literal}, '
-            f'{anything}], {_TIMEOUT}) -> None: ...'
-        )
-    getters.append(
-        f'    def get_parameters(self, node_name: str, names: {names_of}[str], {_TIMEOUT}) -> '
-        f'dict[str, {anything}]: ...'
-    )
-    setters.append(
-        f'    def set_parameters(self, node_name: str, values: {mapping}[str, {anything}], '
-        f'{_TIMEOUT}) -> None: ...'
-    )
+        values = f'{mapping}[{literal}, {anything}]'
+        rows.append((_literal(imports, every), literal, values, decorator))
+    rows.append(('str', 'str', f'{mapping}[str, {anything}]', ''))
     yield from ('', f'class _SystemNode({imports.take("composer", "Node")}):')
+    getters = (
+        f'{decorator}    def get_parameters(self, node_name: {node}, names: {names_of}[{names}], '
+        f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
+        for node, names, _, decorator in rows
+    )
+    setters = (
+        f'{decorator}    def set_parameters(self, node_name: {node}, values: {values}, '
+        f'{_TIMEOUT}) -> None: ...'
+        for node, _, values, decorator in rows
+    )
     yield from _overloaded(imports, getters)
     yield from _overloaded(imports, setters)
 
@@ -153,17 +143,19 @@ class _Writer:
         yield f'    parameters: {self.imports.take("typing", "Final")}[{self.name}Parameters]'
         yield from self._property('state', f'{self.name}State')
         yield from self._property('logger', self.imports.support('Logger'))
-        yield from _overloaded(
-            self.imports, (self._publish(name, types) for name, types in shape.publishers)
-        ) or [self._method('publish', 'Never', 'Never', '', 'None')]
-        for method in ('call', 'call_async'):
-            yield from _overloaded(
-                self.imports,
-                (self._call(method, name, types) for name, types in shape.service_clients),
-            ) or [self._method(method, 'Never', 'Never', f', {_TIMEOUT}', 'None')]
-        yield from _overloaded(
-            self.imports, (self._send_goal(name, types) for name, types in shape.action_clients)
-        ) or [self._method('send_goal', 'Never', 'Never', f', {_TIMEOUT}', 'None')]
+        rest = f', {_TIMEOUT}'
+        methods = {
+            'publish': ([self._publish(*publisher) for publisher in shape.publishers], ''),
+            **{
+                each: ([self._call(each, *client) for client in shape.service_clients], rest)
+                for each in ('call', 'call_async')
+            },
+            'send_goal': ([self._send_goal(*client) for client in shape.action_clients], rest),
+        }
+        for method, (lines, rest) in methods.items():
+            yield from _overloaded(self.imports, lines) or [
+                self._method(method, 'Never', 'Never', rest, 'None')
+            ]
 
     def _property(self, name: str, of_type: str) -> Iterator[str]:
         yield '    @property'

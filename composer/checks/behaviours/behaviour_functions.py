@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic, Span
+    from composer.diagnostics import Diagnostic
     from composer.entity_kinds import BehaviourKey
     from composer.language.bindings import Binding
     from composer.language.specs import BehaviourSpec
     from composer.python_source.function_kinds import FunctionKind
-    from composer.python_source.modules import FunctionSource, ModuleSource
+    from composer.python_source.modules import ModuleSource
 
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # Modules of the standard library with functions that take anything, such as `print`.
 _TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'unittest')
 
@@ -46,8 +47,7 @@ def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
                 fitting.add(call)
         elif binding.behaviour.module not in told:
             told.add(binding.behaviour.module)
-            explain = _explain_broken_module if module.syntax_error else _explain_unread_module
-            yield explain(context, binding, module)
+            yield _explain_broken_module(context, binding, module)
 
 
 def is_called_wrongly(context: CheckContext, binding: Binding) -> bool:
@@ -64,13 +64,10 @@ def check_behaviour_call(
     """Check that a function fits its place; a kind or signature of `None` is unknown."""
     behaviour = binding.behaviour
     if kind is not None and kind.is_generator and not binding.may_yield:
-        yield context.at_value(
-            behaviour.path,
-            'generator-not-allowed',
-            f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one",
-            part=behaviour.function,
-            help='timers and actions take generators; return the value instead',
-        )
+        text = f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one"
+        advice = 'timers and actions take generators; return the value instead'
+        path, part = behaviour.path, behaviour.function
+        yield context.at_value(path, 'generator-not-allowed', text, part=part, help=advice)
     if signature is not None:
         yield from _check_signature(context, binding, signature)
 
@@ -78,54 +75,43 @@ def check_behaviour_call(
 def _explain_broken_module(
     context: CheckContext, binding: Binding, module: ModuleSource
 ) -> Diagnostic:
-    """Return one finding for all behaviours of a module, at its error or where it is named."""
-    behaviour = binding.behaviour
-    reason = str(module.syntax_error).removeprefix(f'{module.path}:{module.error_line}: ')
-    message = f"the module '{behaviour.module}' is not valid Python: {reason}"
+    """Return one finding for all behaviours of a module that is not read, or is not valid."""
+    path, name = binding.behaviour.path, binding.behaviour.module
+    if not module.syntax_error:
+        text = f"the module '{name}' is not checked: {module.unread}"
+        advice = 'put its behaviours into a smaller module'
+        return context.at_value(path, 'unread-module', text, part=name, first=True, help=advice)
+    reason = module.syntax_error.removeprefix(f'{module.path}:{module.error_line}: ')
+    text = f"the module '{name}' is not valid Python: {reason}"
     if module.error_line:
         place = module.place_of(module.error_line)
-        related = [context.related_value(behaviour.path, f'{binding.owner} is bound to it here')]
-        return diagnostic_at(place, 'broken-module', message, related=related)
-    return context.at_value(
-        behaviour.path, 'broken-module', message, part=behaviour.module, first=True
-    )
-
-
-def _explain_unread_module(
-    context: CheckContext, binding: Binding, module: ModuleSource
-) -> Diagnostic:
-    behaviour = binding.behaviour
-    return context.at_value(
-        behaviour.path,
-        'unread-module',
-        f"the module '{behaviour.module}' is not checked: {module.unread}",
-        part=behaviour.module,
-        first=True,
-        help='put its behaviours into a smaller module',
-    )
+        related = [context.related_value(path, f'{binding.owner} is bound to it here')]
+        return diagnostic_at(place, 'broken-module', text, related=related)
+    return context.at_value(path, 'broken-module', text, part=name, first=True)
 
 
 def _check_source(
     context: CheckContext, binding: Binding, module: ModuleSource | MissingModule
 ) -> Iterator[Diagnostic]:
     behaviour = binding.behaviour
-    if _is_of_python(context, behaviour.module):
-        yield context.at_value(
-            behaviour.path,
-            'uncallable-behaviour',
-            f"'{behaviour.name}' is of Python's standard library, and no behaviour: it cannot be "
-            f'called as {binding.call}',
-            help='write a function that calls it',
-        )
+    top = behaviour.module.partition('.')[0]
+    is_of_python = top in sys.stdlib_module_names and top not in _TAKE_ANYTHING
+    if is_of_python and not context.modules.is_of_project(behaviour.module):
+        text = f"'{behaviour.name}' is of Python's standard library, and no behaviour: "
+        text += f'it cannot be called as {binding.call}'
+        advice = 'write a function that calls it'
+        yield context.at_value(behaviour.path, 'uncallable-behaviour', text, help=advice)
     elif isinstance(module, MissingModule):
-        yield _explain_missing_module(context, binding, module)
+        yield _explain_missing_module(context, behaviour, module)
     elif function := module.find_function(behaviour.function):
+        lines = [function.definition.lineno] if function.definition else []
+        lines += [function.first_yield] if function.first_yield else []
+        places = [Related('it is defined here', module.place_of(line)) for line in lines]
         for found in check_behaviour_call(context, binding, function.kind, function.signature):
-            places = _places_of(module, function)
-            yield found.with_related(Related('it is defined here', at) for at in places)
+            yield found.with_related(places)
         yield from _check_constructor(context, behaviour, module)
     elif not (module.is_open or module.top.is_dynamic):
-        yield _explain_missing_function(context, binding, module)
+        yield _explain_missing_function(context, behaviour, module)
 
 
 def _check_constructor(
@@ -137,15 +123,11 @@ def _check_constructor(
     if of is None or of.class_definition is None or signature is None:
         return
     if not (_binds(signature, 'node') or _binds(signature)):
-        shown = str(signature).replace('=Ellipsis', '=…')
-        yield context.at_value(
-            behaviour.path,
-            'bad-signature',
-            f'{behaviour.class_name}{shown} is made with its node, as '
-            f'{behaviour.class_name}(node), or without arguments',
-            part=behaviour.class_name,
-            related=[Related('it is defined here', module.place_of(of.class_definition.lineno))],
-        )
+        name, shown = behaviour.class_name, str(signature).replace('=Ellipsis', '=…')
+        text = f'{name}{shown} is made with its node, as {name}(node), or without arguments'
+        place = Related('it is defined here', module.place_of(of.class_definition.lineno))
+        path = behaviour.path
+        yield context.at_value(path, 'bad-signature', text, part=name, related=[place])
 
 
 def _binds(signature: inspect.Signature, *arguments: str) -> bool:
@@ -156,94 +138,44 @@ def _binds(signature: inspect.Signature, *arguments: str) -> bool:
     return True
 
 
-def _places_of(module: ModuleSource, function: FunctionSource) -> Iterator[Span]:
-    """Yield where a function is defined, and where it yields first."""
-    if function.definition is None:
-        return
-    yield module.place_of(function.definition.lineno)
-    if (line := function.first_yield) is not None:
-        yield module.place_of(line)
-
-
-def _is_of_python(context: CheckContext, module: str) -> bool:
-    """Return whether a module is of the standard library, whose functions take no node."""
-    top = module.partition('.')[0]
-    is_of_python = top in sys.stdlib_module_names and top not in _TAKE_ANYTHING
-    return is_of_python and not context.modules.is_of_project(module)
-
-
 def _explain_missing_module(
-    context: CheckContext, binding: Binding, module: MissingModule
+    context: CheckContext, behaviour: BehaviourSpec, module: MissingModule
 ) -> Diagnostic:
-    behaviour = binding.behaviour
     path = behaviour.module.replace('.', '/')
     otherwise = f'create {path}.py in the project, or install the package that has it'
+    advice = did_you_mean(module.nearest, otherwise)
     if module.hidden_by:
-        otherwise = (
-            f'remove {shown_path(module.hidden_by)}, which hides the other modules of this name'
-        )
-    return context.at_value(
-        behaviour.path,
-        'unknown-behaviour',
-        f"there is no module '{module.missing}'",
-        part=module.missing,
-        first=True,
-        help=otherwise if module.hidden_by else did_you_mean(module.nearest, otherwise),
-    )
+        shown = shown_path(module.hidden_by)
+        advice = f'remove {shown}, which hides the other modules of this name'
+    text, part = f"there is no module '{module.missing}'", module.missing
+    rule = 'unknown-behaviour'
+    return context.at_value(behaviour.path, rule, text, part=part, first=True, help=advice)
 
 
 def _explain_missing_function(
-    context: CheckContext, binding: Binding, module: ModuleSource
-) -> Diagnostic:
-    behaviour = binding.behaviour
-    if behaviour.class_name:
-        return _explain_missing_method(context, behaviour, module)
-    what = module.constants.get(behaviour.function)
-    if what:
-        return context.at_value(
-            behaviour.path,
-            'uncallable-behaviour',
-            f"'{behaviour.name}' is {what}, and cannot be called",
-            part=behaviour.function,
-        )
-    return context.at_value(
-        behaviour.path,
-        'unknown-behaviour',
-        f"{behaviour.module} has no function '{behaviour.function}'",
-        part=behaviour.function,
-        help=_suggest_function(behaviour.function, module),
-    )
-
-
-def _explain_missing_method(
     context: CheckContext, behaviour: BehaviourSpec, module: ModuleSource
 ) -> Diagnostic:
+    rule, part = 'unknown-behaviour', behaviour.function
+    advice: str | None = None
     owner = module.functions.get(behaviour.class_name)
     of = owner.class_definition if owner else None
-    if of is None:
-        classes = [name for name, each in module.functions.items() if each.class_definition]
-        return context.at_value(
-            behaviour.path,
-            'unknown-behaviour',
-            f"{behaviour.module} has no class '{behaviour.class_name}'",
-            part=behaviour.class_name,
-            help=suggest(behaviour.class_name, classes, 'it has', 'it has no classes'),
-        )
-    methods = [
-        each.name for each in of.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)
-    ]
-    return context.at_value(
-        behaviour.path,
-        'unknown-behaviour',
-        f"the class '{behaviour.class_name}' has no method '{behaviour.method_name}'",
-        part=behaviour.method_name,
-        help=suggest(
-            behaviour.method_name,
-            [each for each in methods if each[0] != '_'],
-            'it has',
-            'it has no methods',
-        ),
-    )
+    if of is not None:
+        part = behaviour.method_name
+        text = f"the class '{behaviour.class_name}' has no method '{part}'"
+        names = [node.name for node in of.body if isinstance(node, _FUNCTIONS)]
+        names = [name for name in names if name[0] != '_']
+        advice = suggest(part, names, 'it has', 'it has no methods')
+    elif behaviour.class_name:
+        part = behaviour.class_name
+        text = f"{behaviour.module} has no class '{part}'"
+        names = [name for name, each in module.functions.items() if each.class_definition]
+        advice = suggest(part, names, 'it has', 'it has no classes')
+    elif what := module.constants.get(part):
+        rule, text = 'uncallable-behaviour', f"'{behaviour.name}' is {what}, and cannot be called"
+    else:
+        text = f"{behaviour.module} has no function '{part}'"
+        advice = _suggest_function(part, module)
+    return context.at_value(behaviour.path, rule, text, part=part, help=advice)
 
 
 def _suggest_function(name: str, module: ModuleSource) -> str:
@@ -259,8 +191,14 @@ def _check_signature(
     context: CheckContext, binding: Binding, signature: inspect.Signature
 ) -> Iterator[Diagnostic]:
     behaviour = binding.behaviour
-    by_keyword = _keyword_parameters(signature)
-    taken = _positional_parameters(signature)[: len(binding.parameters)]
+    named: dict[object, list[str]] = {}
+    for parameter in signature.parameters.values():
+        named.setdefault(parameter.kind, []).append(parameter.name)
+    kinds = inspect.Parameter
+    plain = named.get(kinds.POSITIONAL_OR_KEYWORD, [])
+    taken = [*named.get(kinds.POSITIONAL_ONLY, []), *plain][: len(binding.parameters)]
+    # `None` if any name can be given by keyword.
+    by_keyword = None if kinds.VAR_KEYWORD in named else plain + named.get(kinds.KEYWORD_ONLY, [])
     free = [name for name in by_keyword or () if name not in taken]
     # A misspelt name counts as the name that it means: it has a finding of its own.
     owner = behaviour.path[:-1]
@@ -268,29 +206,22 @@ def _check_signature(
     was_dropped = any(path[:-1] == owner for path in context.system.dropped)
     given = set(free if was_dropped else behaviour.arguments)
     # An argument counts as given although its expression has an error.
-    given |= {name for name in free if context.was_dropped((*behaviour.path[:-1], 'with', name))}
+    given |= {name for name in free if context.was_dropped((*owner, 'with', name))}
     for keyword in behaviour.arguments:
         if by_keyword is not None and (keyword not in by_keyword or keyword in taken):
             given.discard(keyword)
             given.add(find_nearest(keyword, free) or '')
-            yield context.at_key(
-                (*behaviour.path[:-1], 'with', keyword),
-                'bad-argument',
-                f"{behaviour.name} takes no argument '{keyword}'",
-                help=suggest(keyword, free, 'it takes', 'it takes no more arguments'),
-            )
+            text = f"{behaviour.name} takes no argument '{keyword}'"
+            advice = suggest(keyword, free, 'it takes', 'it takes no more arguments')
+            yield context.at_key((*owner, 'with', keyword), 'bad-argument', text, help=advice)
     yield from _check_values(context, binding, signature)
     try:
         keywords = dict.fromkeys(given - {'', *taken})
         signature.bind(*binding.parameters, **keywords)
     except TypeError as error:
-        shown = str(signature).replace('=Ellipsis', '=…')
-        yield context.at_value(
-            behaviour.path,
-            'bad-signature',
-            f'{behaviour.function}{shown} is called as {binding.call}: {error}',
-            part=behaviour.function,
-        )
+        name, shown = behaviour.function, str(signature).replace('=Ellipsis', '=…')
+        text = f'{name}{shown} is called as {binding.call}: {error}'
+        yield context.at_value(behaviour.path, 'bad-signature', text, part=name)
 
 
 def _check_values(
@@ -314,12 +245,10 @@ def _check_values(
         wanted = find_wanted_values(annotation, value, bounds)
         if wanted:
             shown = ' or '.join(sorted({each.text for each in wanted}))
-            yield context.at_value(
-                (*behaviour.path[:-1], 'with', keyword),
-                'bad-argument',
-                f"{behaviour.name} takes {shown} as '{keyword}', and is given {_shown(value)}",
-                help=suggest(value, [each.option for each in wanted]),
-            )
+            text = f"{behaviour.name} takes {shown} as '{keyword}', and is given {_shown(value)}"
+            path = (*behaviour.path[:-1], 'with', keyword)
+            advice = suggest(value, [each.option for each in wanted])
+            yield context.at_value(path, 'bad-argument', text, help=advice)
 
 
 def _annotation_of(parameter: inspect.Parameter) -> str:
@@ -337,17 +266,3 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return 'a mapping' if isinstance(value, dict) else 'a list'
     return repr(value)
-
-
-def _positional_parameters(signature: inspect.Signature) -> list[str]:
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return [each.name for each in signature.parameters.values() if each.kind in kinds]
-
-
-def _keyword_parameters(signature: inspect.Signature) -> list[str] | None:
-    """Return the names that can be given by keyword, `None` if any can."""
-    parameters = signature.parameters.values()
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
-        return None
-    kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return [parameter.name for parameter in parameters if parameter.kind in kinds]

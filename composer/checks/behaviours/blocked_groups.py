@@ -8,7 +8,7 @@ from composer.checks.behaviours.behaviour_bodies import bound_at
 from composer.checks.connections.deadlocks import group_in
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.bindings import node_bindings
-from composer.node_uses.waiting import FILLING
+from composer.node_uses.waiting import FILLING, QUEUES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,16 +20,14 @@ if TYPE_CHECKING:
     from composer.language.specs import NodeSpec
     from composer.node_uses.reading import Awaited, Block, Reading
 
-# What brings about what is waited for.
+# What brings about what is waited for, by the kind of that.
 _VERBS = {
-    'queue.LifoQueue': 'fills',
-    'queue.PriorityQueue': 'fills',
-    'queue.Queue': 'fills',
-    'queue.SimpleQueue': 'fills',
     'threading.Barrier': 'comes to',
     'threading.Condition': 'notifies',
     'threading.Semaphore': 'releases',
+    **dict.fromkeys(QUEUES, 'fills'),
 }
+_INSTEAD = 'let a timer do the rest, or a generator, which a timer resumes'
 _Read: TypeAlias = 'tuple[NodeSpec, Binding, Reading]'
 
 
@@ -49,7 +47,12 @@ def check_blocked_groups(context: CheckContext) -> Iterator[Diagnostic]:
                 found.setdefault(block.place, _explain(context, waiter, block, fillers[0]))
         for seconds, place in waiter[2].sleeps:
             if _is_long(waiter, seconds, every):
-                found.setdefault(place, _explain_length(context, waiter[1], seconds, place))
+                owner = waiter[1].owner
+                text = f'{owner} does nothing for {seconds:g} s here, and nothing else of its '
+                text += 'callback group runs meanwhile'
+                related = [bound_at(context, waiter[1])]
+                late = diagnostic_at(place, 'long-sleep', text, help=_INSTEAD, related=related)
+                found.setdefault(place, late)
     yield from found.values()
 
 
@@ -58,28 +61,11 @@ def _is_long(waiter: _Read, seconds: float, every: list[_Read]) -> bool:
     node, binding, _ = waiter
     group, entity = group_in(node, binding), binding.entity
     limit = getattr(entity, 'warn_after_sec', None)
-    if (
-        group is None
-        or limit is None
-        or seconds < limit
-        or not getattr(binding.kind, 'has_group', 0)
-    ):
+    has_group = group is not None and getattr(binding.kind, 'has_group', False)
+    if not has_group or limit is None or seconds < limit:
         return False
     others = (group_in(other, each) == group for other, each, _ in every if each is not binding)
     return any(others) or seconds > getattr(entity, 'period_sec', seconds)
-
-
-def _explain_length(
-    context: CheckContext, binding: Binding, seconds: float, place: Span
-) -> Diagnostic:
-    return diagnostic_at(
-        place,
-        'long-sleep',
-        f'{binding.owner} does nothing for {seconds:g} s here, and nothing else of its callback '
-        'group runs meanwhile',
-        help='let a timer do the rest, or a generator, which a timer resumes',
-        related=[bound_at(context, binding)],
-    )
 
 
 def _find_fillers(
@@ -128,38 +114,20 @@ def _is_blocked(waiter: _Read, filler: _Read) -> bool:
 
 
 def _explain(context: CheckContext, waiter: _Read, block: Block, filler: _Read) -> Diagnostic:
-    _, binding, _ = waiter
-    _, filling, _ = filler
-    verb = _VERBS.get(block.what.kind, 'sets')
+    (_, binding, _), (_, filling, _), what = waiter, filler, block.what
+    verb, shown = _VERBS.get(what.kind, 'sets'), f"'{what.name}'"
+    if what.made_at is not None or what.owner == 'state':
+        shown = what.name if what.made_at is not None else f"'node.state.{what.name}'"
+    reason = f'which only {filling.owner} of the same callback group {verb}: neither can continue'
+    advice = f'give {filling.owner} a group of its own, or do the rest there'
     if binding.owner == 'on_start':
         reason = f'which only {filling.owner} {verb}, and that runs after it'
-        help_text = 'do the rest in the behaviour that it comes to'
-    else:
-        reason = (
-            f'which only {filling.owner} of the same callback group {verb}: neither can continue'
-        )
-        help_text = f'give {filling.owner} a group of its own, or do the rest there'
-    return diagnostic_at(
-        block.place,
-        'blocked-group',
-        f'{binding.owner} waits for {_shown(block.what)}, {reason}',
-        help=help_text,
-        related=[
-            *_elsewhere(block.place, 'it is called here', block.called_at),
-            *_elsewhere(block.place, 'it is made here', block.what.made_at),
-            bound_at(context, binding),
-            bound_at(context, filling),
-        ],
-    )
-
-
-def _shown(what: Awaited) -> str:
-    if what.made_at is not None:
-        return what.name
-    return f"'node.state.{what.name}'" if what.owner == 'state' else f"'{what.name}'"
-
-
-def _elsewhere(place: Span, text: str, other: Span | None) -> list[Related]:
-    """Return a place that is in another line."""
-    is_elsewhere = other and (other.source, other.line) != (place.source, place.line)
-    return [Related(text, other)] if other and is_elsewhere else []
+        advice = 'do the rest in the behaviour that it comes to'
+    places = (('it is called here', block.called_at), ('it is made here', what.made_at))
+    here = (block.place.source, block.place.line)
+    related = [
+        *(Related(text, at) for text, at in places if at and (at.source, at.line) != here),
+        *(bound_at(context, each) for each in (binding, filling)),
+    ]
+    message = f'{binding.owner} waits for {shown}, {reason}'
+    return diagnostic_at(block.place, 'blocked-group', message, help=advice, related=related)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.missing_names import KINDS, Library
-from composer.diagnostics import Span, diagnostic_at
+from composer.diagnostics import diagnostic_at
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import home_of
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, Span
     from composer.language.bindings import Binding
 
 _RULE = 'missing-module'
@@ -55,12 +55,10 @@ def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
         library = Library(context)
         for importer in walk.importers:
             for missing in library.find_missing(importer.source):
-                place = _place_of(missing.node, importer.source)
                 where = f"'{importer.binding.behaviour.name}' is in this module, or imports it"
                 related = [context.related_value(importer.binding.behaviour.path, where)]
-                yield diagnostic_at(
-                    place, missing.rule, missing.message, help=missing.help, related=related
-                )
+                place, rule, advice = missing.place, missing.rule, missing.help
+                yield diagnostic_at(place, rule, missing.message, help=advice, related=related)
 
 
 @record
@@ -90,10 +88,7 @@ class _Walk:
             if each in self._visited:
                 continue
             self._visited.add(each)
-            is_followed = (
-                len(self.importers) < _MOST_MODULES and each.partition('.')[0] != 'composer'
-            )
-            if not (is_followed and self.context.modules.is_of_project(each)):
+            if len(self.importers) >= _MOST_MODULES or not self._is_of_project(each):
                 continue
             pending += [each.rpartition('.')[0]] if '.' in each else []
             module = self.context.modules.find(each)
@@ -128,7 +123,8 @@ class _Walk:
             return []
         if isinstance(statement, ast.Import):
             for alias in statement.names:
-                self._check_module(alias.name, importer, _place_of_name(alias, importer.source))
+                place = importer.source.span_of(alias, alias.name)
+                self._check_module(alias.name, importer, place)
             return [alias.name for alias in statement.names]
         written = '.' * statement.level + (statement.module or '')
         place = importer.source.place_of(statement.lineno).narrowed_to(written, first=True)
@@ -177,7 +173,8 @@ class _Walk:
             return True
         if inner:
             # Packages that are installed may make their modules themselves.
-            return _is_of_python(top) and modules.is_package(missing.rpartition('.')[0])
+            is_of_python = top in sys.stdlib_module_names
+            return is_of_python and modules.is_package(missing.rpartition('.')[0])
         # A Python without ROS cannot run the system: another one has what it needs.
         return bool(importlib.util.find_spec('rclpy'))
 
@@ -195,7 +192,7 @@ class _Walk:
         source, name = self.context.modules.find(home), f'{home}.{alias.name}'
         if not isinstance(source, ModuleSource) or self.context.modules.has(name):
             return
-        place = _place_of_name(alias, importer.source)
+        place = importer.source.span_of(alias, alias.name)
         known = {*source.functions, *source.constants}
         if source.path is None:
             missing = self.context.modules.find_missing(name)
@@ -219,19 +216,3 @@ class _Walk:
         where = f"'{behaviour.name}' cannot be imported without it"
         related = [self.context.related_value(behaviour.path, where)]
         self.findings.append(diagnostic_at(place, _RULE, message, help=help_text, related=related))
-
-
-def _is_of_python(name: str) -> bool:
-    return name.partition('.')[0] in sys.stdlib_module_names
-
-
-def _place_of(node: ast.Attribute | ast.alias, source: ModuleSource) -> Span:
-    if isinstance(node, ast.alias):
-        return _place_of_name(node, source)
-    return source.span_of(node)
-
-
-def _place_of_name(alias: ast.alias, source: ModuleSource) -> Span:
-    line = source.place_of(alias.lineno)
-    column = len(line.source.line(alias.lineno).encode()[: alias.col_offset].decode()) + 1
-    return Span(line.source, alias.lineno, column, len(alias.name))

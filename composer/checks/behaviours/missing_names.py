@@ -14,10 +14,10 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from composer.interfaces.message_types import PARTS, in_python
+from composer.node_uses.reading import Problem
 from composer.python_source.annotations import dotted_name, find_interface
 from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import bound_names, imported_names, list_nodes, words_in
-from composer.records import record
 from composer.spelling import find_nearest, suggest
 
 if TYPE_CHECKING:
@@ -38,20 +38,6 @@ _WORD = re.compile(r'\b[A-Za-z]\w*')
 _OF_CLASSES = {'get_fields_and_field_types', 'SLOT_TYPES', 'Event', *PARTS}
 
 
-@record
-class MissingName:
-    """A name that is not where the code looks for it.
-
-    Attributes:
-        node: What names it: an attribute, or a part of an import.
-    """
-
-    rule: str
-    node: ast.Attribute | ast.alias
-    message: str
-    help: str | None
-
-
 @dataclass(slots=True)
 class Library:
     """What the modules have that are not of the project, each read once."""
@@ -59,44 +45,41 @@ class Library:
     context: CheckContext
     _texts: dict[str, str] = field(default_factory=dict)
 
-    def find_missing(self, module: ModuleSource) -> Iterator[MissingName]:
+    def find_missing(self, module: ModuleSource) -> Iterator[Problem]:
         """Yield the names that the code of a module uses, and that do not exist."""
         nodes = list_nodes(module.body)
         imports = _imports_of(nodes)
-        stored = {node.attr for node in _attributes(nodes, ast.Store)}
+        attributes = [node for node in nodes if isinstance(node, ast.Attribute)]
+        stored = {node.attr for node in attributes if isinstance(node.ctx, ast.Store)}
         asked = set(map(id, _asked_first(nodes)))
         for node in nodes:
-            if id(node) in asked:
-                continue
+            names: list[tuple[str, str, ast.AST]] = []
+            rule = 'missing-module' if isinstance(node, ast.ImportFrom) else 'unknown-attribute'
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                for alias in node.names:
-                    yield from self._explain('missing-module', node.module, alias.name, alias)
+                names = [(node.module, alias.name, alias) for alias in node.names]
             elif isinstance(node, ast.Attribute) and node.attr not in stored:
                 first, dot, rest = dotted_name(node.value).partition('.')
                 if first in imports:
-                    owner = imports[first] + dot + rest
-                    yield from self._explain('unknown-attribute', owner, node.attr, node)
+                    names = [(imports[first] + dot + rest, node.attr, node)]
+            for owner, name, place in names if id(node) not in asked else ():
+                own_rule, found = self._explain(owner, name)
+                if found is not None:
+                    yield Problem(
+                        own_rule or rule, found[0], module.span_of(place, name), found[1]
+                    )
 
-    def _explain(
-        self, rule: str, owner: str, name: str, node: ast.Attribute | ast.alias
-    ) -> Iterator[MissingName]:
-        """Yield what is wrong with a name, if that is certain."""
+    def _explain(self, owner: str, name: str) -> tuple[str, tuple[str, str | None] | None]:
+        """Return the rule that a name breaks for certain, if it has one, with what is wrong."""
+        interface, package = find_interface(owner), owner.partition('.')[0]
         if name.startswith('_') or name == '*':
-            return
-        interface = find_interface(owner)
-        package = owner.partition('.')[0]
+            return '', None
         if interface is not None:
-            found = self._missing_in_class(interface, name)
-            rule = 'unknown-field'
-        elif package in self.context.catalogue.packages():
-            found = self._missing_in_package(owner, name)
-            rule = 'missing-module'
-        elif self.context.modules.is_of_project(package) and package != 'composer':
-            return
-        else:
-            found = self._missing_in_module(owner, name)
-        if found is not None:
-            yield MissingName(rule, node, *found)
+            return 'unknown-field', self._missing_in_class(interface, name)
+        if package in self.context.catalogue.packages():
+            return 'missing-module', self._missing_in_package(owner, name)
+        if self.context.modules.is_of_project(package) and package != 'composer':
+            return '', None
+        return '', self._missing_in_module(owner, name)
 
     def _missing_in_class(self, interface: str, name: str) -> tuple[str, str | None] | None:
         types = self.context.types
@@ -136,7 +119,8 @@ class Library:
         return f"{owner} has no '{name}'", meant
 
     def _missing_in_module(self, owner: str, name: str) -> tuple[str, str | None] | None:
-        loaded = _loaded(owner) if _is_of_python(owner) else None
+        is_of_python = owner.partition('.')[0] in sys.stdlib_module_names
+        loaded = _loaded(owner) if is_of_python else None
         modules = self.context.modules
         if loaded is not None:
             is_there, known = hasattr(loaded, name), dir(loaded)
@@ -176,16 +160,6 @@ def _loaded(full_name: str) -> object:
             return None
         found = within
     return found
-
-
-def _is_of_python(name: str) -> bool:
-    return name.partition('.')[0] in sys.stdlib_module_names
-
-
-def _attributes(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> list[ast.Attribute]:
-    return [
-        each for each in nodes if isinstance(each, ast.Attribute) and isinstance(each.ctx, context)
-    ]
 
 
 def _imports_of(nodes: Iterable[ast.AST]) -> dict[str, str]:

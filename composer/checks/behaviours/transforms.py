@@ -53,6 +53,9 @@ def _check_fields(
     subscription: SubscriptionSpec,
     fields: dict[str, object],
 ) -> Iterator[Diagnostic]:
+    # The import of jinja2 takes a tenth of the time of a check, and most files do not need it.
+    from composer.checks.behaviours.message_expressions import evaluate_over
+
     publisher = node.publishers.get(subscription.publish or '')
     heard = _describe(context, subscription.type)
     made = _describe(context, publisher.type) if publisher else None
@@ -60,8 +63,11 @@ def _check_fields(
         path = (*subscription.path, 'with', 'fields', name)
         findings = list(_check_name(context, made, name, path)) if made else []
         if heard:
-            wrong, value = _evaluate(context, heard, str(expression), path)
-            findings += wrong
+            wrong, value = evaluate_over(str(expression), heard, context.catalogue)
+            findings += [
+                context.at_value(path, each.rule, each.message, part=each.part, help=each.help)
+                for each in wrong
+            ]
             if made and value and not findings:
                 findings += _check_type(context, made, value, path)
         yield from findings
@@ -91,20 +97,6 @@ def _check_name(
     if owner and owner.field(part) is None:
         error = unknown_field(owner.name, part, [each.name for each in owner.fields])
         yield context.at_key(path, 'unknown-field', str(error), help=error.help)
-
-
-def _evaluate(
-    context: CheckContext, heard: MessageDescription, expression: str, path: DataPath
-) -> tuple[list[Diagnostic], ExpressionValue | None]:
-    """Return what is wrong with an expression, and what is known of its value."""
-    # The import of jinja2 takes a tenth of the time of a check, and most files do not need it.
-    from composer.checks.behaviours.message_expressions import evaluate_over
-
-    findings, value = evaluate_over(expression, heard, context.catalogue)
-    return [
-        context.at_value(path, each.rule, each.message, part=each.part, help=each.help)
-        for each in findings
-    ], value
 
 
 def _check_type(

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
-    from composer.entity_kinds import EntityKind
     from composer.language.bindings import Binding
     from composer.node_uses.reading import NodeUse, Reading
     from composer.yaml_text.positions import DataPath
@@ -159,24 +158,16 @@ def _explain_name(
     context: CheckContext, node: NodeSpec, binding: Binding, use: NodeUse
 ) -> Diagnostic:
     kind = KIND_OF_NOUN[use.kind]
-    declares_not = f"node '{node.name}' declares no {use.kind} '{use.name}'"
-    rule = f'unknown-{kind.slug}'
-    message = declares_not
-    if use.is_optional:
-        rule = 'missing-parameter'
-        message = f'{declares_not}, so this is None'
-    return diagnostic_at(
-        use.place,
-        rule,
-        message,
-        help=suggest(
-            use.name,
-            getattr(node, kind.section),
-            'it declares',
-            f"declare it under '{kind.section}:'",
-        ),
-        related=[bound_at(context, binding)],
+    rule, message = (
+        f'unknown-{kind.slug}',
+        f"node '{node.name}' declares no {use.kind} '{use.name}'",
     )
+    if use.is_optional:
+        rule, message = 'missing-parameter', f'{message}, so this is None'
+    known, otherwise = getattr(node, kind.section), f"declare it under '{kind.section}:'"
+    advice = suggest(use.name, known, 'it declares', otherwise)
+    related = [bound_at(context, binding)]
+    return diagnostic_at(use.place, rule, message, help=advice, related=related)
 
 
 def _check_unused(
@@ -187,7 +178,11 @@ def _check_unused(
     unused: dict[Span, Diagnostic] = {}
     used: set[Span] = set()
     for node, uses in nodes:
-        open_kinds = _open_kinds(node, uses, are_read=are_read)
+        open_kinds = frozenset(kind for each in uses for kind in each.open_kinds)
+        # A behaviour may react to changes only, and a node without behaviours has its parameters
+        # for others.
+        hears = node.before_parameters_set or node.on_parameters or node.after_parameters_set
+        open_kinds |= {'parameter'} if are_read or hears or not uses else set()
         names = {(use.kind, use.name) for each in uses for use in each.uses}
         names |= {('publisher', trigger.publish or '') for trigger in node.triggers}
         names |= {('parameter', name) for name in node.followed}
@@ -204,8 +199,11 @@ def _check_unused(
                 if is_used or _is_of_ros(kind.noun, name):
                     used.add(span)
                 elif span not in unused:
-                    unused[span] = _explain_unused(context, kind, name, entity.path)
-        touched = mentioned.union(*map(_state_names, uses))
+                    text = f"{kind.noun} '{name}' is declared, and {kind.unused}"
+                    rule, advice = f'unused-{kind.slug}', 'remove it, or use it in a behaviour'
+                    unused[span] = context.at_key(entity.path, rule, text, help=advice)
+        touched = mentioned.union(*({*each.state_set, *each.state_tested} for each in uses))
+        touched |= {use.name for each in uses for use in each.state_read}
         is_open = not uses or any(each.is_state_open for each in uses)
         for name in node.state:
             path = (*node.path, 'state', name)
@@ -218,11 +216,6 @@ def _check_unused(
     yield from (finding for span, finding in unused.items() if span not in used)
 
 
-def _state_names(reading: Reading) -> set[str]:
-    """Return the names of `node.state` that a behaviour uses."""
-    return {*reading.state_set, *reading.state_tested, *(each.name for each in reading.state_read)}
-
-
 def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     """Yield the entities that undeclared names may mean: the nearest one, or all of the kind.
 
@@ -233,31 +226,6 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
         if name and name not in declared and not _is_of_ros(kind, name):
             near = find_nearest(name, declared)
             yield from ((kind, each) for each in (declared if near is None else (near,)))
-
-
-def _open_kinds(node: NodeSpec, uses: list[Reading], *, are_read: bool) -> frozenset[str]:
-    """Return the kinds of which any entity may be used.
-
-    Args:
-        are_read: Whether some behaviour reads parameters of other nodes.
-    """
-    kinds = frozenset(kind for each in uses for kind in each.open_kinds)
-    # A behaviour may react to changes only, and a node without behaviours has its parameters for
-    # others.
-    hears = node.before_parameters_set or node.on_parameters or node.after_parameters_set
-    is_for_others = bool(are_read or hears or not uses)
-    return kinds | {'parameter'} if is_for_others else kinds
-
-
-def _explain_unused(
-    context: CheckContext, kind: EntityKind, name: str, path: DataPath
-) -> Diagnostic:
-    return context.at_key(
-        path,
-        f'unused-{kind.slug}',
-        f"{kind.noun} '{name}' is declared, and {kind.unused}",
-        help='remove it, or use it in a behaviour',
-    )
 
 
 def _is_of_ros(kind: str, name: str) -> bool:

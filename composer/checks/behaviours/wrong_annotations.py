@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.interfaces.descriptions import MessageDescription
     from composer.language.specs import BehaviourSpec
     from composer.node_uses.wires import Wire
     from composer.python_source.syntax import FunctionNode
@@ -39,13 +38,9 @@ def check_annotations(context: CheckContext) -> Iterator[Diagnostic]:
             if key not in problems:
                 problems[key] = [*_find_problems(context, behaviour, wire)]
             for problem in problems[key]:
-                yield context.at_value(
-                    behaviour.path,
-                    _RULE,
-                    f"'{behaviour.function}' {problem}",
-                    part=behaviour.function,
-                    help=f'change the annotation, or the type of {binding.owner}',
-                )
+                path, name = behaviour.path, behaviour.function
+                advice = f'change the annotation, or the type of {binding.owner}'
+                yield context.at_value(path, _RULE, f"'{name}' {problem}", part=name, help=advice)
 
 
 def _find_problems(context: CheckContext, behaviour: BehaviourSpec, wire: Wire) -> Iterator[str]:
@@ -96,9 +91,10 @@ def _check_payload(
         return
     description = context.types.describe(wanted)
     if read.interface is not None:
-        fits = context.types.are_alike(read.interface, wanted) or _may_hold(
-            description, read.interface
-        )
+        fields = description.fields if description is not None else ()
+        # The only field of a message may have this type.
+        fits = description is None or context.types.are_alike(read.interface, wanted)
+        fits |= len(fields) == 1 and fields[0].type.nested == read.interface
     elif read.builtin in _SAMPLES and description is not None:
         sample = _SAMPLES[read.builtin]
         fits = not any(check_payload(description, sample, context.catalogue))
@@ -106,14 +102,6 @@ def _check_payload(
         return
     if not fits:
         yield f'{verb} a {_shown(read)}, which does not make a {in_python(wanted)}'
-
-
-def _may_hold(description: MessageDescription | None, interface: str) -> bool:
-    """Return whether the only field of a message may have this type."""
-    if description is None:
-        return True
-    fields = description.fields
-    return len(fields) == 1 and fields[0].type.nested == interface
 
 
 def _shown(read: Annotation) -> str:

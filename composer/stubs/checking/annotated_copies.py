@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from composer.entity_kinds import PUBLISHED
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource
+from composer.python_source.syntax import count_characters
 from composer.records import record
 from composer.stubs.checking.received_values import changed_names
 from composer.stubs.field_types import StubImports
@@ -156,14 +157,14 @@ def _annotate(
     line = argument.lineno
     text = lines[line - 1]
     if argument.annotation is None:
-        end = _characters(text, argument.col_offset) + len(argument.arg)
+        end = count_characters(text, argument.col_offset) + len(argument.arg)
         yield _Edit(line, end, end, f": '{wanted}'")
         return
     given = argument.annotation
     written = given.value if isinstance(given, ast.Constant) else ast.unparse(given)
     if is_node and written in _GENERAL and given.lineno == given.end_lineno:
-        start = _characters(lines[given.lineno - 1], given.col_offset)
-        end = _characters(lines[given.lineno - 1], given.end_col_offset or 0)
+        start = count_characters(lines[given.lineno - 1], given.col_offset)
+        end = count_characters(lines[given.lineno - 1], given.end_col_offset or 0)
         yield _Edit(given.lineno, start, end, f"'{wanted}'")
 
 
@@ -180,8 +181,3 @@ def _annotate_return(function: FunctionNode, wanted: str, lines: list[str]) -> I
                 line = function.lineno + token.end[0] - 1
                 yield _Edit(line, token.end[1], token.end[1], f" -> '{wanted}'")
                 return
-
-
-def _characters(line: str, offset: int) -> int:
-    """Return how many characters the first bytes of a line are."""
-    return len(line.encode()[:offset].decode(errors='replace'))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.language.bindings import node_bindings
-from composer.python_source.syntax import list_arguments
+from composer.python_source.syntax import list_arguments, positional_names
 from composer.stubs.project_modules import all_nodes
 
 if TYPE_CHECKING:
@@ -73,8 +73,7 @@ class FunctionUse:
 
     def names(self) -> list[str]:
         """Return the names of the positional parameters."""
-        arguments = self.definition.args
-        names = [each.arg for each in (*arguments.posonlyargs, *arguments.args)]
+        names = positional_names(self.definition)
         return names[1:] if self.is_method else names
 
     def give(self, name: str, received: Received) -> None:
@@ -86,14 +85,15 @@ def find_received_values(
     context: CheckContext, modules: Mapping[str, ProjectModule]
 ) -> dict[FunctionKey, FunctionUse]:
     """Return the functions of a project that are given nodes or messages, by module and name."""
-    functions = {
-        (name, statement.name): FunctionUse(statement)
-        for name, module in modules.items()
-        for statement in module.tree.body
-        if isinstance(statement, _FUNCTIONS) and not statement.decorator_list
-    }
+    functions: dict[FunctionKey, FunctionUse] = {}
     for name, module in modules.items():
-        functions |= _methods_of(name, module)
+        for top in module.tree.body:
+            inner = top.body if isinstance(top, ast.ClassDef) else [top]
+            owner = f'{top.name}.' if isinstance(top, ast.ClassDef) else ''
+            for node in inner:
+                if isinstance(node, _FUNCTIONS) and not node.decorator_list:
+                    use = FunctionUse(node, is_method=bool(owner))
+                    functions[name, f'{owner}{node.name}'] = use
     _give_bound(context, functions)
     sizes = -1
     for _ in range(_MOST_ROUNDS):
@@ -104,16 +104,6 @@ def find_received_values(
             break
         sizes = grown
     return functions
-
-
-def _methods_of(name: str, module: ProjectModule) -> dict[FunctionKey, FunctionUse]:
-    return {
-        (name, f'{of.name}.{each.name}'): FunctionUse(each, is_method=True)
-        for of in module.tree.body
-        if isinstance(of, ast.ClassDef)
-        for each in of.body
-        if isinstance(each, _FUNCTIONS) and not each.decorator_list
-    }
 
 
 def changed_names(function: FunctionNode) -> set[str]:

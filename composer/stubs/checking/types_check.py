@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from composer.python_source.syntax import bound_names
 from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator
 from composer.stubs.checking.left_alone import CopySyntax
 from composer.stubs.checking.received_values import find_received_values
@@ -66,15 +67,16 @@ def find_type_errors(
     if result is None:
         texts = {path: copy.text for path, copy in copies.items()}
         result = run_type_checker(program, texts, files)
+    own, defined = _own_names(modules)
     findings = TypeFindings(
         context,
         classes.nodes_by_name(),
         classes.shapes_by_name(),
         annotator.functions,
         _message_classes(files),
-        _own_names(modules) | _changed_classes(modules),
+        own,
         frozenset(modules),
-        _defined_names(modules),
+        defined,
     )
     every, kept = [], []
     for path, copy in copies.items():
@@ -136,52 +138,33 @@ def _message_classes(files: dict[str, str]) -> dict[str, str]:
     return names
 
 
-def _own_names(modules: dict[str, ProjectModule]) -> frozenset[str]:
-    """Return the names of what the modules define, or import from anywhere but ROS."""
-    defined = (
-        node.name
-        for module in modules.values()
-        for node in ast.walk(module.tree)
-        if isinstance(node, ast.ClassDef)
-    )
-    imported = (
-        name
-        for module in modules.values()
-        for name, full_name in module.source.imports.items()
-        if not _OF_ROS.search(full_name)
-    )
-    return frozenset([*defined, *imported])
+def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of classes of which the stubs do not tell all, and all that are defined.
 
-
-def _defined_names(modules: dict[str, ProjectModule]) -> frozenset[str]:
-    """Return all names that the code of the modules may give to something."""
-    found: set[str] = set()
-    for node in (each for module in modules.values() for each in ast.walk(module.tree)):
-        match node:
-            case ast.Attribute(attr=name, ctx=ast.Store()) | ast.Name(id=name, ctx=ast.Store()):
-                found.add(name)
-            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
-                found.add(name)
-            case ast.ClassDef(name=name) | ast.arg(arg=name) | ast.Constant(value=str(name)):
-                found.add(name)
-    return frozenset(found)
-
-
-def _changed_classes(modules: dict[str, ProjectModule]) -> frozenset[str]:
-    """Return the names of the classes to which the modules add attributes."""
-    return frozenset(
-        node.value.id
-        for module in modules.values()
-        for node in ast.walk(module.tree)
-        if isinstance(node, ast.Attribute)
-        and isinstance(node.ctx, ast.Store)
-        and isinstance(node.value, ast.Name)
-    )
+    The first are classes that the modules define, import from anywhere but ROS, or add attributes
+    to; the second all names that their code may give to something.
+    """
+    own: set[str] = set()
+    defined: set[str] = set()
+    for module in modules.values():
+        imports = module.source.imports.items()
+        own |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
+        for node in ast.walk(module.tree):
+            names = [] if isinstance(node, ast.Import | ast.ImportFrom) else bound_names(node)
+            defined.update(names)
+            own.update(names if isinstance(node, ast.ClassDef) else ())
+            match node:
+                case ast.Attribute(value=owner, attr=name, ctx=ast.Store()):
+                    defined.add(name)
+                    own |= {owner.id} if isinstance(owner, ast.Name) else set()
+                case ast.Constant(value=str(name)):
+                    defined.add(name)
+    return frozenset(own), frozenset(defined)
 
 
 def _lines_told(found: list[Diagnostic], copy: AnnotatedCopy) -> Iterator[int]:
     """Yield the lines of a module in which the other checks found something."""
-    name = copy.module.source.place_of(1).source.name
+    name = copy.module.source.source.name
     for finding in found:
         for span in (finding.span, *(related.span for related in finding.related)):
             if span is not None and span.source.name == name:
