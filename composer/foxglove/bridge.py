@@ -33,7 +33,7 @@ from composer.runtime.middleware.ros_graph import create_graph_node
 from composer.runtime.system_executor import SystemExecutor
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from foxglove.websocket import ChannelView, Client, ClientChannel, Parameter
     from rclpy.context import Context
@@ -90,6 +90,7 @@ class FoxgloveBridge(ServerListener):
         self._channels: dict[tuple[str, str], _Channel] = {}
         self._services: set[str] = set()
         self._wanted: Counter[str] = Counter()
+        self._warned: set[str] = set()
         self._watches_graph = threading.Event()
         self._may_show_graph = threading.Event()
         # What the threads of the server tell; they may hold its locks.
@@ -115,7 +116,7 @@ class FoxgloveBridge(ServerListener):
             raise StartError(message, help='--foxglove 0 takes any port that is free') from error
         _limit_stalls(self._server.port)
         log.info(f'Foxglove: open ws://{options.address}:{self._server.port}')
-        self._recorder = SystemRecorder(self, self, log.warning, _LISTENER, is_late=True)
+        self._recorder = SystemRecorder(self, self, self._warn_once, _LISTENER, is_late=True)
         self._thread = threading.Thread(target=self._run, name='composer-foxglove', daemon=True)
         self._sender = threading.Thread(target=self._send, name='composer-sender', daemon=True)
 
@@ -151,6 +152,13 @@ class FoxgloveBridge(ServerListener):
     def _tell_error(self, text: str) -> None:
         self._log.error(text)
 
+    def _warn_once(self, text: str) -> None:
+        # Each message of a topic may have an error of its own.
+        subject = text.partition(': ')[0]
+        if subject not in self._warned:
+            self._warned.add(subject)
+            self._log.warning(text)
+
     # As a recorder, and as its patterns
 
     def __len__(self) -> int:
@@ -170,7 +178,10 @@ class FoxgloveBridge(ServerListener):
             self._has_entries.clear()
             for _ in range(len(entries)):
                 channel, _, published_ns, data = entries.popleft()
-                channel.base.log(data, log_time=published_ns)
+                try:
+                    channel.base.log(data, log_time=published_ns)
+                except Exception as error:  # noqa: BLE001 - a message costs no more than itself
+                    self._warn_once(f"a message of '{channel.topic}' is left out: {error}")
             self._ended.wait(_BURST_SEC)
 
     def has(self, topic: str) -> bool:
@@ -201,13 +212,19 @@ class FoxgloveBridge(ServerListener):
 
     def _run(self) -> None:
         while not self._ended.is_set():
-            # A behaviour may have shut down what all use; the system ends then.
-            with suppress(InvalidHandle):
-                self._look()
+            self._try(self._look)
             with suppress(queue.Empty):
-                topic = self._told.get(timeout=_LOOK_SEC)
-                if topic:
-                    self._recorder.follow(topic)
+                if topic := self._told.get(timeout=_LOOK_SEC):
+                    self._try(self._recorder.follow, topic)
+
+    def _try(self, act: Callable[..., object], *arguments: Any) -> None:
+        try:
+            act(*arguments)
+        except InvalidHandle:
+            # A behaviour may have shut down what all use; the system ends then.
+            pass
+        except Exception as error:  # noqa: BLE001 - the bridge goes on with all others
+            self._warn_once(f'not all is shown to Foxglove: {error}')
 
     def _look(self) -> None:
         """Show topics and services that have come, and no more those that have gone."""

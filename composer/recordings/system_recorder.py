@@ -129,7 +129,7 @@ def create_tap(
         try:
             data = serialize(message, message_class)
         except Exception as error:  # noqa: BLE001 - whoever publishes it is told by rclpy
-            report(f"a message of '{channel.topic}' is not recorded: {error}")
+            report(f"a message of '{channel.topic}' is left out: {error}")
             return
         now_ns = time_ns()
         append((channel, now_ns, now_ns, data))

@@ -1,6 +1,7 @@
 """Foxglove's protocol, spoken by a client of its own to a system that runs."""
 
 import json
+import logging
 import re
 import socket
 import struct
@@ -19,6 +20,8 @@ from std_srvs.srv import SetBool
 from websockets.sync.client import connect
 
 from composer.cli.main import run
+from composer.foxglove import BridgeOptions
+from composer.foxglove.bridge import FoxgloveBridge
 from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
@@ -196,6 +199,25 @@ def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(start, peer, c
         wait_for(lambda: not sender.get_subscription_count(), 'the end of the subscription')
     assert system.stop() == 0
     assert not system.matching('ERROR')
+
+
+def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog):
+    caplog.set_level(logging.INFO)
+    bridge = FoxgloveBridge(BridgeOptions(0, '127.0.0.1', False), 'robot', logging.getLogger())
+    with ExitStack() as stack:
+        stack.callback(bridge.stop)
+        node.create_publisher(Int64, '/time', 1)
+        bridge.start(context)
+        one = stack.enter_context(connected(int(caplog.messages[0].rpartition(':')[2])))
+        one.subscribe('/time', 1)
+        wait_for(lambda: bridge.has('/time'), 'the subscription')
+        channel = bridge.open_channel('/time', Int64)
+        # The clock of a publisher may be before 1970.
+        for stamp_ns in (-1, -2, 1):
+            bridge.append((channel, 0, stamp_ns, serialize_message(Int64(data=stamp_ns))))
+        assert [message.data for message in one.messages(1, Int64)] == [1]
+    [warning] = [each.message for each in caplog.records if each.levelname == 'WARNING']
+    assert warning.startswith("a message of '/time' is left out: ")
 
 
 def test_clients_change_the_system_where_they_may(start):
