@@ -62,6 +62,7 @@ class Subscription:
             read_only=spec.read_only,
             reason=_why_sent(spec),
             waits=self.predecessor is not None,
+            what=str(self._owner),
         )
         self.events.change(events_of(spec), spec)
         if self.predecessor is None:

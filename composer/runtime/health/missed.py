@@ -74,12 +74,11 @@ def count_missed(
 
     Args:
         inbox: The queue of a subscription for what does not come through the middleware.
-        what: What a trace calls a timer.
+        what: What a trace calls the entity.
     """
     counter: MissedNothing
     if isinstance(entity, Subscription):
         counter = QueueOverruns(entity.qos_profile, inbox)
-        what = entity.topic_name
     elif isinstance(entity, Timer):
         counter = MissedTicks()
     else:

@@ -122,7 +122,7 @@ class LocalPublisher:
     def follow_tracer(self) -> None:
         """Have what is handed over noted while the tracer is on."""
         receivers = [
-            (each, TracedInbox(each.node, each.ros, inbox) if tracer.is_on else inbox)
+            (each, TracedInbox(each.node, each.what, inbox) if tracer.is_on else inbox)
             for each, inbox in self._matched
         ]
         self._receivers = (
@@ -224,6 +224,7 @@ class LocalSubscription:
         reason: Why messages for it are sent.
         read_only: Whether it shares messages with others.
         waits: Whether another one gets its messages until it is replaced.
+        what: What a trace calls it.
     """
 
     def __init__(
@@ -235,6 +236,7 @@ class LocalSubscription:
         *,
         read_only: bool,
         waits: bool = False,
+        what: str = '',
     ) -> None:
         self.node = node
         self.ros = ros
@@ -242,6 +244,7 @@ class LocalSubscription:
         self.reason = reason
         self.read_only = read_only
         self.waits = waits
+        self.what = what
 
 
 def is_latched(ros: RosPublisher) -> bool:
@@ -348,18 +351,20 @@ class LocalTopics:
         read_only: bool = False,
         reason: str = '',
         waits: bool = False,
+        what: str = '',
     ) -> LocalSubscription:
         """Take in a subscription of the rclpy node `node`.
 
         Args:
             reason: Why only the middleware can deliver to it; empty if that is not so.
             waits: Whether `replace_subscription` gives it another one's messages later.
+            what: What a trace calls it.
         """
         reason = reason or why_sent(ros.qos_profile)
         depth = queue_depth(ros.qos_profile)
         inbox = None if reason and not waits else self._executor.open_inbox(node, ros, depth)
         subscription = LocalSubscription(
-            node, ros, inbox, reason, read_only=read_only, waits=waits
+            node, ros, inbox, reason, read_only=read_only, waits=waits, what=what
         )
         with self._lock:
             topic = self._topic(ros)

@@ -181,13 +181,13 @@ class Tracer:
         begun_ns = self._publications.get(thread)
         if not self.is_on or begun_ns is None:
             return
-        messages, (node, track, topic) = inbox.messages, inbox.place
+        messages, (node, track, name) = inbox.messages, inbox.place
         now_ns, arrow, length = self.now_ns(), next(self._arrows), len(messages) + 1
         if length > inbox.most:
             length -= 1
             with suppress(IndexError):  # Another thread was faster.
                 self._waiting.pop(id(messages[0]), None)
-            self._add(('dropped', node, track, topic, now_ns, now_ns, 1))
+            self._add(('dropped', node, track, name, now_ns, now_ns, 1))
         if (waiting := self._waiting.get(id(message))) is None:
             self._waiting[id(message)] = [(arrow, inbox)]
         else:
@@ -195,8 +195,8 @@ class Tracer:
         # Two events at once.
         self._add(
             (
-                *('arrow', node, thread, topic, begun_ns, now_ns, arrow),
-                *('queue', node, track, topic, now_ns, now_ns, length),
+                *('arrow', node, thread, name, begun_ns, now_ns, arrow),
+                *('queue', node, track, name, now_ns, now_ns, length),
             )
         )
 
@@ -205,7 +205,7 @@ class TracedInbox:
     """Stands for the queue of a subscription where messages are put into it.
 
     Args:
-        ros: The rclpy subscription.
+        what: The subscription, as its callbacks are called.
 
     Attributes:
         messages: Those of the queue.
@@ -213,10 +213,10 @@ class TracedInbox:
         place: Node, track and name of its length.
     """
 
-    def __init__(self, node: Any, ros: Any, inbox: Inbox) -> None:
+    def __init__(self, node: Any, what: str, inbox: Inbox) -> None:
         self.messages = inbox.messages
         self.most = math.inf if inbox.depth is None else inbox.depth
-        self.place = node.get_fully_qualified_name(), MARKS, ros.topic_name
+        self.place = node.get_fully_qualified_name(), MARKS, what
         self._put = inbox.put
 
     def put(self, message: Any) -> None:

@@ -22,7 +22,9 @@ nodes:
     publishers: {scan: {type: std_msgs/msg/Int64}}
     timers: {tick: {rate: 50, behaviour: parts:tick, publish: scan}}
   fusion:
-    subscriptions: {scan: {type: std_msgs/msg/Int64, behaviour: parts:fuse, publish: map}}
+    subscriptions:
+      scan: {type: std_msgs/msg/Int64, behaviour: parts:fuse, publish: map}
+      again: {topic: scan, type: std_msgs/msg/Int64, behaviour: parts:ignore}
     publishers: {map: {type: std_msgs/msg/Int64}}
   planner:
     subscriptions:
@@ -44,6 +46,9 @@ def tick(node):
 
 def fuse(node, message):
     return message.data
+
+def ignore(node, message):
+    pass
 
 def plan(node, message):
     time.sleep(0.05)
@@ -133,6 +138,7 @@ class Trace:
 
 ARROWS = {
     ('/lidar publish /scan', "/fusion subscription 'scan'"),
+    ('/lidar publish /scan', "/fusion subscription 'again'"),
     ('/fusion publish /map', "/planner subscription 'map'"),
     ('/planner publish /cmd', "/motor subscription 'cmd'"),
 }
@@ -147,7 +153,22 @@ def _check(trace, shortest_ms=49.9):
     assert len(calls) == pytest.approx(len(callbacks['/planner', "timer 'ask'"]), abs=1)
     lengths = [event['args']['messages'] for event in trace.events if event['ph'] == 'C']
     assert {0, 1, 2} <= set(lengths)
-    assert ('/planner', 'dropped /map') in trace.marks()
+    queues = {
+        (
+            trace.nodes[event['pid']].replace(f' ({CASE})', '').replace(' (other)', ''),
+            event['name'],
+        )
+        for event in trace.events
+        if event['ph'] == 'C'
+    }
+    # Each of two queues for one topic has a counter.
+    assert queues == {
+        ('/fusion', "queue subscription 'scan'"),
+        ('/fusion', "queue subscription 'again'"),
+        ('/planner', "queue subscription 'map'"),
+        ('/motor', "queue subscription 'cmd'"),
+    }
+    assert ('/planner', "dropped subscription 'map'") in trace.marks()
 
 
 def test_a_running_system_is_traced_from_beside_it(compose, capsys):
