@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
@@ -13,21 +14,22 @@ from composer.node_uses.reading import (
     USED_NOUNS,
     Payload,
     Reading,
+    Wire,
     missing_reading,
     unknown_reading,
+    wire_of,
 )
 from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
 from composer.node_uses.walk import TooLongError, Walk
-from composer.node_uses.wires import Wire, wire_of
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource, ModuleSource
 from composer.python_source.return_values import ends_without_value, never_returns
 from composer.python_source.syntax import (
-    list_arguments,
     list_children,
     own_nodes,
     positional_names,
 )
+from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
 
 # That a call may raise is no way to end a loop.
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise)
+_ENDLESS = 'this loop never ends, and nothing else of its callback group runs again'
+_BY_TIMER = 'let a timer call the behaviour'
 # What the behaviours of these keys return: the types, and what to return instead.
 _TRANSITION: tuple[set[type], str] = ({bool, type(None)}, 'False if it failed, or nothing')
 _ANSWERS: dict[str, tuple[set[type], str]] = {
@@ -146,10 +150,8 @@ class BehaviourReader:
     def _object_of(self, of: Class) -> Instance:
         """Return the object that the node has of a class: it is made with the node."""
         init = self._names.attribute(Instance(of), '__init__')
-        if not isinstance(init, Function):
-            return Instance(of)
-        parameters = [each.arg for each in list_arguments(init.definition.args)][1:]
-        return Instance(of, ((parameters[0], Chain(('node',))),)) if parameters else Instance(of)
+        names = positional_names(init.definition)[1:2] if isinstance(init, Function) else []
+        return Instance(of, tuple((name, Chain(('node',))) for name in names))
 
     def _given(self, function: Function, binding: Binding) -> dict[str, Value]:
         names = positional_names(function.definition)[1 if function.bound is not None else 0 :]
@@ -158,35 +160,35 @@ class BehaviourReader:
         return dict(zip(names, values, strict=False))
 
 
+@record
 class _Results:
     """Notes what a behaviour gives away, and whether it comes to an end."""
 
-    def __init__(
-        self,
-        walk: Walk,
-        function: Function,
-        given: dict[str, Value],
-        binding: Binding,
-        wire: Wire,
-    ) -> None:
-        self._walk = walk
-        self._run = walk.run
-        self._function = function
-        self._binding = binding
-        self._wire = wire
-        definition = function.definition
-        is_plain = not isinstance(definition, ast.Lambda)
-        self._kind = FunctionSource(definition).kind if is_plain else FunctionKind.PLAIN  # type: ignore[arg-type]
-        self._scope = Scope(function.module, definition, given)
+    walk: Walk
+    function: Function
+    given: dict[str, Value]
+    binding: Binding
+    wire: Wire
+
+    @cached_property
+    def kind(self) -> FunctionKind | None:
+        definition = self.function.definition
+        if isinstance(definition, ast.Lambda):
+            return FunctionKind.PLAIN
+        return FunctionSource(definition).kind
+
+    @cached_property
+    def scope(self) -> Scope:
+        return Scope(self.function.module, self.function.definition, self.given)
 
     def note(self) -> None:
         """Note all of it."""
-        definition = self._function.definition
+        definition = self.function.definition
         if isinstance(definition, ast.Lambda):
             return
-        if self._function.bound is not None:
-            self._note_init(self._function.bound)
-        is_generator = self._kind is not None and self._kind.is_generator
+        if self.function.bound is not None:
+            self._note_init(self.function.bound)
+        is_generator = self.kind is not None and self.kind.is_generator
         for node in own_nodes(definition):
             match node:
                 case ast.Return(value=ast.expr() as value):
@@ -195,65 +197,62 @@ class _Results:
                 case ast.Yield(value=ast.expr() as value) if is_generator:
                     self._note_payload(value, 'yielded')
                 case ast.While(test=test) if self._is_endless(node):
-                    text = (
-                        'this loop never ends, and nothing else of its callback group runs again'
-                    )
-                    help_text = 'let a timer call the behaviour'
-                    self._run.report('endless-loop', self._function.module, test, text, help_text)
-        is_last = self._kind is FunctionKind.ASYNC_GENERATOR
-        is_allowed = self._binding.may_yield or not is_generator
+                    run, module = self.walk.run, self.function.module
+                    run.report('endless-loop', module, test, _ENDLESS, _BY_TIMER)
+        is_last = self.kind is FunctionKind.ASYNC_GENERATOR
+        is_allowed = self.binding.may_yield or not is_generator
         # The last one that an asynchronous generator yields is the result.
-        if self._wire.needs_payload and is_allowed and not is_last:
+        if self.wire.needs_payload and is_allowed and not is_last:
             self._check_ways(definition)
 
     def _note_init(self, bound: Value) -> None:
         """Walk through the making of the object whose method the behaviour is."""
-        names = self._walk.run.names
+        names = self.walk.run.names
         init = names.attribute(bound, '__init__')
         if isinstance(bound, Instance) and isinstance(init, Function):
-            self._walk.enter(init, dict(bound.given), is_waited=True)
+            self.walk.enter(init, dict(bound.given), is_waited=True)
 
     def _note_payload(self, value: ast.expr, key: str) -> None:
-        module = self._function.module
+        module = self.function.module
         is_none = isinstance(value, ast.Constant) and value.value is None
-        is_last = self._kind is FunctionKind.ASYNC_GENERATOR
+        is_last = self.kind is FunctionKind.ASYNC_GENERATOR
         if not is_none and not is_last:
-            self._run.reading.payloads.append(Payload('', key, '', value, module, True))
+            self.walk.run.reading.payloads.append(Payload('', key, '', value, module, True))
             for node in value.values if isinstance(value, ast.Dict) else [value]:
-                if self._wire.returned or self._wire.yielded:
-                    self._walk.need(node, self._scope)
-        if self._wire.is_unpublished and _is_made_there(value):
-            self._run.reading.unpublished.append(module.span_of(value))
+                if self.wire.returned or self.wire.yielded:
+                    self.walk.need(node, self.scope)
+        if self.wire.is_unpublished and _is_made_there(value):
+            self.walk.run.reading.unpublished.append(module.span_of(value))
 
     def _is_endless(self, loop: ast.While) -> bool:
         """Return whether nothing else of the group runs once a loop has begun."""
-        kind = self._binding.kind
+        kind = self.binding.kind
         # Goals have threads of their own.
-        if self._kind is not FunctionKind.PLAIN or (kind is not None and kind.channel == 'action'):
+        if self.kind is not FunctionKind.PLAIN or (kind is not None and kind.channel == 'action'):
             return False
         is_always_true = isinstance(loop.test, ast.Constant) and bool(loop.test.value)
         return is_always_true and not any(isinstance(node, _WAYS_OUT) for node in own_nodes(loop))
 
     def _check_answer(self, value: ast.expr) -> None:
         """Check what `accept`, `on_parameters` and transitions return."""
-        key = self._binding.key.key
+        key = self.binding.key.key
         wanted, advice = _ANSWERS.get(key, _TRANSITION)
         if key not in _ANSWERS and key not in TRANSITION_BEHAVIOURS:
             return
         kind = _type_of(value)
         if kind is not None and kind not in wanted:
-            text = f'{self._binding.owner} returns a {kind.__name__}'
-            module = self._function.module
-            self._run.report('bad-answer', module, value, text, f'return {advice}')
+            text = f'{self.binding.owner} returns a {kind.__name__}'
+            module = self.function.module
+            self.walk.run.report('bad-answer', module, value, text, f'return {advice}')
 
     def _check_ways(self, definition: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
         """Check that all ways give the response or result that is waited for."""
         if _is_stub(definition):
             return
-        names, module = self._run.names, self._function.module
+        names, module = self.walk.run.names, self.function.module
 
         def is_last(call: ast.Call) -> bool:
-            called = names.value_of(call.func, self._scope)
+            called = names.value_of(call.func, self.scope)
             last = called.definition if isinstance(called, Function) else None
             return last is not None and not isinstance(last, ast.Lambda) and never_returns(last)
 
@@ -263,7 +262,7 @@ class _Results:
             text = 'some ways through this function return nothing, and the caller gets an error'
             help_text = 'return something at its end'
             place = definition if bare is None or definition in ends else bare
-            self._run.report('missing-return', module, place, text, help_text)
+            self.walk.run.report('missing-return', module, place, text, help_text)
 
 
 def _is_made_there(node: ast.expr) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import operator
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 
     from composer.interfaces.descriptions import FieldDescription
     from composer.interfaces.message_types import MessageTypes
-    from composer.node_uses.reading import MessageUse, Reading
-    from composer.node_uses.wires import Wire
+    from composer.node_uses.reading import MessageUse, Reading, Wire
     from composer.python_source.modules import ModuleSource
 
 _PYTHON_TYPES: dict[str, type] = {
@@ -115,24 +115,20 @@ class _Payloads:
                 yield from self.message(description, other)
             case ast.Dict(keys=keys, values=values):
                 for key, item in zip(keys, values, strict=True):
-                    if isinstance(key, ast.Constant) and isinstance(key.value, str):
-                        yield from self._entry(description, key.value, key, item)
+                    if not (isinstance(key, ast.Constant) and isinstance(key.value, str)):
+                        continue
+                    field = description.field(key.value)
+                    if field is not None:
+                        yield from self.field(description, field, item)
+                    else:
+                        names = [each.name for each in fields]
+                        error = unknown_field(in_python(description.name), key.value, names)
+                        place = self._module.span_of(key, key.value)
+                        yield Problem('unknown-field', str(error), place, error.help)
             case _ if len(fields) == 1:
                 yield from self.field(description, fields[0], value)
             case ast.Constant(value=bool() | int() | float() | str()):
                 yield from self._literal(description, value, value)
-
-    def _entry(
-        self, description: MessageDescription, name: str, key: ast.expr, value: ast.expr
-    ) -> Iterator[Problem]:
-        field = description.field(name)
-        if field is not None:
-            yield from self.field(description, field, value)
-            return
-        names = [each.name for each in description.fields]
-        error = unknown_field(in_python(description.name), name, names)
-        place = self._module.span_of(key, name)
-        yield Problem('unknown-field', str(error), place, error.help)
 
     def field(
         self, description: MessageDescription, field: FieldDescription, value: ast.expr
@@ -149,29 +145,16 @@ class _Payloads:
             for item in items:
                 yield from self.message(nested, item)
         else:
-            yield from self._scalars(description, field, value, items)
-
-    def _scalars(
-        self,
-        description: MessageDescription,
-        field: FieldDescription,
-        value: ast.expr,
-        items: list[ast.expr],
-    ) -> Iterator[Problem]:
-        try:
-            data = literal_of(value)
-        except NotLiteralError:
-            if not (items and field.type.array) or any(
-                isinstance(item, ast.Starred) for item in items
-            ):
+            with suppress(NotLiteralError):
+                data = {field.name: literal_of(value)}
+                yield from self._literal(description, value, data)
                 return
-            try:
-                check_length(field.type, len(items))
-            except FieldError as error:
-                text = format_field_error(description.name, (field.name,), str(error))
-                yield Problem(error.rule, text, self._module.span_of(value), error.help)
-            return
-        yield from self._literal(description, value, {field.name: data})
+            if items and field.type.array and not any(isinstance(i, ast.Starred) for i in items):
+                try:
+                    check_length(field.type, len(items))
+                except FieldError as error:
+                    text = format_field_error(description.name, (field.name,), str(error))
+                    yield Problem(error.rule, text, self._module.span_of(value), error.help)
 
     def _literal(
         self, description: MessageDescription, value: ast.expr, data: object

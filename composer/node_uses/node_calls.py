@@ -201,12 +201,7 @@ def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> N
                 known = literal_of(value) if value is not key else None
             except NotLiteralError:
                 known = None
-            remote = RemoteParameter(
-                text,
-                module.span_of(node, text),
-                key.value,
-                scope.module.span_of(key, key.value),
-                known,
-                scope.module.span_of(value),
-            )
+            name, place = key.value, scope.module.span_of(key, key.value)
+            told = (name, place, known, scope.module.span_of(value))
+            remote = RemoteParameter(text, module.span_of(node, text), *told)
             run.reading.remote_parameters.append(remote)

@@ -18,27 +18,12 @@ if TYPE_CHECKING:
 _Tested = frozenset[str] | None
 # Expressions whose value is never `None`.
 _VALUES = (
-    ast.BinOp,
-    ast.Compare,
-    ast.Dict,
-    ast.DictComp,
-    ast.JoinedStr,
-    ast.List,
-    ast.ListComp,
-    ast.Tuple,
-    ast.UnaryOp,
+    *(ast.BinOp, ast.Compare, ast.Dict, ast.DictComp, ast.JoinedStr, ast.List, ast.ListComp),
+    *(ast.Tuple, ast.UnaryOp),
 )
 _WITHOUT_RETURN = {'exit', 'quit', 'sys.exit', 'os._exit', 'os.abort'}
 _EXITS = {
-    '_exit',
-    'abort',
-    'assert_never',
-    'execl',
-    'execv',
-    'execve',
-    'execvp',
-    'exit',
-    'fail',
+    *('_exit', 'abort', 'assert_never', 'execl', 'execv', 'execve', 'execvp', 'exit', 'fail'),
     'quit',
 }
 _ENDLESS = {'count', 'cycle', 'repeat'}
@@ -140,13 +125,12 @@ def never_returns(function: FunctionNode) -> bool:
     return not any(_returns(function)) and _ends(function)
 
 
-def _is_exit(call: ast.Call) -> bool:
-    return dotted_name(call.func) in _WITHOUT_RETURN
-
-
 def _ends(function: FunctionNode) -> bool:
     """Return whether no way through a function comes to its end: all return or raise."""
-    return _Ways(function, _is_exit, is_certain=False).follow(function.body, frozenset()) is None
+    ways = _Ways(
+        function, lambda call: dotted_name(call.func) in _WITHOUT_RETURN, is_certain=False
+    )
+    return ways.follow(function.body, frozenset()) is None
 
 
 def _is_bare(statement: ast.Return) -> bool:
@@ -287,7 +271,11 @@ class _Ways:
         # It may name all that there are.
         is_whole = len(subjects) > len(set(subjects)) or any(
             (isinstance(node, ast.Call) and _last_name(node.func) in _TESTS_OF_TYPES)
-            or (isinstance(node, ast.Compare) and _is_in(node) and not self._is_given(node.left))
+            or (
+                isinstance(node, ast.Compare)
+                and any(isinstance(operator, ast.In) for operator in node.ops)
+                and not self._is_given(node.left)
+            )
             for node in ast.walk(test)
         )
         return not is_whole and not self._is_tested(test, tested)
@@ -338,10 +326,6 @@ def _is_endless(loop: ast.For | ast.AsyncFor | ast.While) -> bool:
     if isinstance(loop, ast.While):
         return isinstance(loop.test, ast.Constant) and bool(loop.test.value)
     return isinstance(loop.iter, ast.Call) and _last_name(loop.iter.func) in _ENDLESS
-
-
-def _is_in(test: ast.Compare) -> bool:
-    return any(isinstance(operator, ast.In) for operator in test.ops)
 
 
 def _last_name(called: ast.expr) -> str:

@@ -6,10 +6,17 @@ field, constants of the class, and the parts of services and actions as inner na
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING
 
+from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
+from composer.input_limits import UnreadableFileError, read_file
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.descriptions import (
     ActionDescription,
+    ConstantDescription,
     FieldDescription,
     FieldType,
     MessageDescription,
@@ -19,8 +26,18 @@ from composer.stubs.field_types import PAYLOADS, FieldTypes, StubImports, is_wri
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
+    from pathlib import Path
 
+    from composer.interfaces.catalogue import InterfaceKind
+    from composer.interfaces.declared_packages import DeclaredPackages
     from composer.interfaces.descriptions import InterfaceDescription
+
+_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+# A constant's type and name; the value does not matter here.
+_CONSTANT = re.compile(r'^[ \t]*(\w+)(?:<=\d+)?[ \t]+([A-Z]\w*)[ \t]*=', re.MULTILINE)
+# What the classes of every service and every action refer to.
+_OF_SERVICES = ('service_msgs', 'builtin_interfaces')
+_OF_ACTIONS = (*_OF_SERVICES, 'action_msgs', 'unique_identifier_msgs')
 
 _UUID = FieldDescription('goal_id', FieldType('message', 'unique_identifier_msgs/msg/UUID'))
 _TIME = FieldType('message', 'builtin_interfaces/msg/Time')
@@ -37,7 +54,104 @@ _COMMON_IMPL = (
 )
 
 
-def list_messages(interface: InterfaceDescription) -> Iterator[MessageDescription]:
+def write_packages(
+    packages: Iterable[str], declared: DeclaredPackages
+) -> Iterator[tuple[str, list[str]]]:
+    """Yield the path and the lines of each stub of packages, and of those that they use.
+
+    Args:
+        packages: Their names; those that do not exist are left out.
+        declared: The packages that the system itself declares.
+    """
+    own = {each.package: each.interfaces for each in declared.definitions or ()}
+    done: set[str] = set()
+    pending = [*packages]
+    while pending:
+        package = pending.pop()
+        if package in done:
+            continue
+        done.add(package)
+        interfaces = own.get(package) or _describe_installed(package)
+        if interfaces:
+            pending += _used_packages(interfaces)
+            yield from _write_package(package, interfaces)
+
+
+def _write_package(
+    package: str, interfaces: Mapping[str, InterfaceDescription | None]
+) -> Iterator[tuple[str, list[str]]]:
+    yield f'{package}/__init__.pyi', []
+    for kind in _KINDS:
+        of_kind = {
+            name: interfaces[name] for name in interfaces if name.startswith(f'{package}/{kind}/')
+        }
+        if of_kind:
+            lines = [*_write_interfaces(f'{package}.{kind}', of_kind)]
+            yield f'{package}/{kind}/__init__.pyi', lines
+    messages = [
+        message for each in interfaces.values() if each is not None for message in each.parts
+    ]
+    yield f'composer_stubs/payloads/{package}.pyi', [*_write_payloads(package, messages)]
+
+
+def _used_packages(interfaces: Mapping[str, InterfaceDescription | None]) -> Iterator[str]:
+    for interface in interfaces.values():
+        if interface is None:
+            continue
+        yield from {'srv': _OF_SERVICES, 'action': _OF_ACTIONS}.get(
+            interface.name.split('/')[1], ()
+        )
+        for message in _list_messages(interface):
+            for field in message.fields:
+                if field.type.nested is not None:
+                    yield field.type.nested.partition('/')[0]
+
+
+@cache
+def _describe_installed(package: str) -> Mapping[str, InterfaceDescription | None]:
+    """Describe an installed package; `None` stands for what nothing can describe."""
+    prefix = find_package(package, ament_prefixes(), INTERFACE_INDEX)
+    if prefix is None:
+        return {}
+    catalogue = InterfaceCatalogue([prefix])
+    names = [name for kind in _KINDS for name in catalogue.names(kind, package)]
+    share = prefix / 'share'
+    return {name: _with_constants(catalogue.describe(name), share / name) for name in names}
+
+
+def _with_constants(
+    interface: InterfaceDescription | None, path: Path
+) -> InterfaceDescription | None:
+    """Add the constants, which only the definition file beside the type description has.
+
+    To read its names takes a hundredth of the time of the real parser, and needs no ROS.
+    """
+    kind = path.parent.name
+    try:
+        text = read_file(path.with_suffix(f'.{kind}')).decode(errors='replace')
+    except UnreadableFileError:
+        return None
+    if interface is None or '=' not in text:
+        return interface
+    sections = re.split('^---', text, flags=re.MULTILINE)
+    parts = [
+        replace(part, constants=tuple(_read_constants(section)))
+        for part, section in zip(interface.parts, sections, strict=False)
+    ]
+    if isinstance(interface, ServiceDescription):
+        return replace(interface, request=parts[0], response=parts[-1])
+    if isinstance(interface, ActionDescription):
+        goal, result, feedback = parts
+        return replace(interface, goal=goal, result=result, feedback=feedback)
+    return parts[0]
+
+
+def _read_constants(text: str) -> Iterator[ConstantDescription]:
+    for kind, name in _CONSTANT.findall(text):
+        yield ConstantDescription(name, FieldType(kind), None)
+
+
+def _list_messages(interface: InterfaceDescription) -> Iterator[MessageDescription]:
     """Yield all messages of an interface, with those that ROS adds to services and actions."""
     if isinstance(interface, ServiceDescription):
         yield from interface.parts
@@ -45,21 +159,17 @@ def list_messages(interface: InterfaceDescription) -> Iterator[MessageDescriptio
     elif isinstance(interface, ActionDescription):
         yield from interface.parts
         for service in _inner_services(interface):
-            yield from list_messages(service)
+            yield from _list_messages(service)
         feedback = FieldDescription('feedback', FieldType('message', interface.feedback.name))
         yield MessageDescription(f'{interface.name}_FeedbackMessage', (_UUID, feedback))
     else:
         yield interface
 
 
-def write_interfaces(
+def _write_interfaces(
     module: str, interfaces: Mapping[str, InterfaceDescription | None]
 ) -> Iterator[str]:
-    """Yield the lines of the stub of a module with interfaces, such as `std_msgs.msg`.
-
-    Args:
-        interfaces: By their full names; `None` for one of which nothing else is known.
-    """
+    """Yield the lines of the stub of a module with interfaces, such as `std_msgs.msg`."""
     imports = StubImports(module)
     classes = [
         line
@@ -106,7 +216,7 @@ def _write_interface(
     if interface is None:
         yield from ('', f'{_last(name)}: {imports.take("typing", "Any")}')
         return
-    for message in list_messages(interface):
+    for message in _list_messages(interface):
         yield from _write_message(message, imports)
     if isinstance(interface, ServiceDescription):
         yield from _write_service(interface.name, imports)
@@ -170,7 +280,7 @@ def _last(name: str) -> str:
     return name.rpartition('/')[2]
 
 
-def write_payloads(package: str, messages: Iterable[MessageDescription]) -> Iterator[str]:
+def _write_payloads(package: str, messages: Iterable[MessageDescription]) -> Iterator[str]:
     """Yield the lines of a stub with what may be given for a package's messages.
 
     A payload is a message, a mapping of fields, or the bare value of a message with one field. A

@@ -8,11 +8,10 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 from composer.stubs.field_types import SUPPORT
-from composer.stubs.interface_stubs import write_packages
-from composer.stubs.node_shapes import shape_of
+from composer.stubs.message_stubs import write_packages
+from composer.stubs.node_shapes import find_stored_names, shape_of
 from composer.stubs.node_stubs import write_nodes
 from composer.stubs.project_modules import all_nodes, find_project_modules, reach_of
-from composer.stubs.stored_names import find_stored_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

@@ -15,8 +15,7 @@ from composer.diagnostics import Related, diagnostic_at
 from composer.entity_kinds import KIND_OF_NOUN, PUBLISHED, TYPE_FOLDERS
 from composer.names import join_names
 from composer.node_uses.message_uses import check_message_uses, find_problems
-from composer.node_uses.reading import Problem
-from composer.node_uses.wires import type_in
+from composer.node_uses.reading import Problem, type_in
 from composer.records import record
 from composer.ros_parameters.parameter_types import find_type_problem
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
@@ -29,8 +28,7 @@ if TYPE_CHECKING:
     from composer.interfaces.catalogue import InterfaceKind
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
-    from composer.node_uses.reading import Reading, RemoteParameter
-    from composer.node_uses.wires import Wire
+    from composer.node_uses.reading import Reading, RemoteParameter, Wire
 
 _ASK = 'give it a default, or ask whether it is None'
 

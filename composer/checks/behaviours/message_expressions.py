@@ -6,6 +6,7 @@ unknown fields. What operators, filters and functions make of values is not look
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from jinja2 import TemplateError, nodes
@@ -75,8 +76,8 @@ def evaluate_over(
     except TemplateError as error:
         return [ExpressionFinding('bad-expression', describe_syntax(error))], None
     types = {name or 'message': FieldType('message', heard.name)}
-    types |= {} if name else {field.name: field.type for field in heard.fields}
-    reader = _Reader(sandbox, types, heard, catalogue)
+    types |= {} if name else {each.name: each.type for each in heard.fields}
+    reader = _Reader(sandbox, types, heard, MessageTypes(catalogue))
     try:
         found = reader.type_of(expression)
     except RecursionError:
@@ -86,22 +87,16 @@ def evaluate_over(
     return reader.findings, ExpressionValue(found) if found else None
 
 
+@dataclass(slots=True)
 class _Reader:
     """Finds the fields that an expression names, and what is wrong with them."""
 
-    def __init__(
-        self,
-        sandbox: Sandbox,
-        types: Mapping[str, FieldType],
-        heard: MessageDescription,
-        catalogue: InterfaceCatalogue,
-    ) -> None:
-        self.findings: list[ExpressionFinding] = []
-        self._sandbox = sandbox
-        self._types = types
-        self._heard = heard
-        self._messages = MessageTypes(catalogue)
-        self._guarded: set[int] = set()
+    sandbox: Sandbox
+    types: Mapping[str, FieldType]
+    heard: MessageDescription
+    messages: MessageTypes
+    findings: list[ExpressionFinding] = field(default_factory=list)
+    guarded: set[int] = field(default_factory=set)
 
     def type_of(self, node: nodes.Node) -> FieldType | None:
         """Return the type of the field that a part is, or `None`; look at all that is in it."""
@@ -120,9 +115,9 @@ class _Reader:
     def _check_exists(self, node: nodes.Filter | nodes.Test) -> None:
         is_filter = isinstance(node, nodes.Filter)
         what = 'filter' if is_filter else 'test'
-        known = self._sandbox.filters if is_filter else self._sandbox.tests
+        known = self.sandbox.filters if is_filter else self.sandbox.tests
         if node.name in _FOR_UNDEFINED:
-            self._guarded.add(id(node.node))
+            self.guarded.add(id(node.node))
         if node.name not in known:
             text = f"there is no {what} '{node.name}'"
             advice = suggest(node.name, known, 'there are')
@@ -130,29 +125,29 @@ class _Reader:
 
     def _find_name(self, node: nodes.Name) -> FieldType | None:
         name = node.name
-        is_known = name in self._types or name in self._sandbox.globals
-        if not is_known and id(node) not in self._guarded:
-            text, advice = f"'{name}' is not defined", suggest(name, self._types, 'in scope are')
+        is_known = name in self.types or name in self.sandbox.globals
+        if not is_known and id(node) not in self.guarded:
+            text, advice = f"'{name}' is not defined", suggest(name, self.types, 'in scope are')
             self.findings.append(ExpressionFinding('undefined-name', text, name, advice))
-        return self._types.get(name)
+        return self.types.get(name)
 
     def _find_field(self, node: nodes.Getattr, owner: FieldType) -> FieldType | None:
         if owner.nested is None:
-            if owner.kind not in _TEXTS and id(node) not in self._guarded:
+            if owner.kind not in _TEXTS and id(node) not in self.guarded:
                 text = f"{owner} has no field '{node.attr}'"
                 self.findings.append(ExpressionFinding('unknown-field', text, node.attr))
             return None
-        of_heard = owner.nested == self._heard.name
-        description = self._heard if of_heard else self._messages.describe(owner.nested)
-        field = description.field(node.attr) if description else None
-        if description is None or field is not None or id(node) in self._guarded:
-            return field.type if field else None
+        of_heard = owner.nested == self.heard.name
+        description = self.heard if of_heard else self.messages.describe(owner.nested)
+        found = description.field(node.attr) if description else None
+        if description is None or found is not None or id(node) in self.guarded:
+            return found.type if found else None
         is_constant = node.attr.isupper()
-        if is_constant and self._messages.may_have_constant(description.name, node.attr):
+        if is_constant and self.messages.may_have_constant(description.name, node.attr):
             return None
-        fields = [field.name for field in description.fields]
+        fields = [each.name for each in description.fields]
         error = unknown_field(description.name, node.attr, fields)
-        known = {*fields, *self._messages.constants(description.name)}
+        known = {*fields, *self.messages.constants(description.name)}
         near = find_nearest(node.attr, known) if is_constant else None
         advice = did_you_mean(near, error.help)
         self.findings.append(ExpressionFinding('unknown-field', str(error), node.attr, advice))

@@ -41,7 +41,11 @@ _ENTITY_DEPTH = 2
 def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use what their node declares, and use all of it."""
     uses = {
-        name: [(each, context.behaviours.read(node, each)) for each in _bindings(context, node)]
+        name: [
+            (binding, context.behaviours.read(node, binding))
+            for binding in context.bindings(node)
+            if not context.was_dropped(binding.behaviour.path)
+        ]
         for name, node in context.spec.nodes.items()
     }
     yield from _check_names(context, uses)
@@ -55,11 +59,6 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         and partial.get(name, node) is node
     ]
     yield from _check_unused(context, whole)
-
-
-def _bindings(context: CheckContext, node: NodeSpec) -> list[Binding]:
-    bindings = context.bindings(node)
-    return [each for each in bindings if not context.was_dropped(each.behaviour.path)]
 
 
 def _lost_by_node(context: CheckContext) -> dict[str, list[DataPath]]:
@@ -141,17 +140,16 @@ def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> 
     of_all = _OF_EVERY_NODE if kind == 'parameter' else set()
     if name in {*getattr(node, section), *of_all}:
         return True
-    return any(path in ((section,), (section, name)) or _may_mean(path, section) for path in lost)
+    return any(
+        path in ((section,), (section, name))
+        or (_is_unknown(path) and find_nearest(path[0], _KEYS_OF_NODES) in (None, section))
+        for path in lost
+    )
 
 
 def _is_unknown(path: DataPath) -> bool:
     """Return whether a path in a node is an unknown key, such as a misspelt section."""
     return len(path) == 1 and path[0] not in _KEYS_OF_NODES
-
-
-def _may_mean(path: DataPath, section: str) -> bool:
-    """Return whether a path in a node is an unknown key that may be meant to be a section."""
-    return _is_unknown(path) and find_nearest(path[0], _KEYS_OF_NODES) in (None, section)
 
 
 def _explain_name(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import BehaviourSpec
-    from composer.node_uses.wires import Wire
+    from composer.node_uses.reading import Wire
     from composer.python_source.syntax import FunctionNode
 
 _RULE = 'wrong-annotation'

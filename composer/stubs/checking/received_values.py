@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.language.bindings import Binding
-    from composer.node_uses.wires import Wire
+    from composer.node_uses.reading import Wire
     from composer.python_source.syntax import FunctionNode
     from composer.stubs.project_modules import ProjectModule
 
