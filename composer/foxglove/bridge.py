@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import foxglove
-from foxglove.websocket import Capability, ServerListener
+from foxglove.websocket import Capability
 from rclpy.exceptions import InvalidHandle
 from websockets import Subprotocol
 from websockets.exceptions import WebSocketException
@@ -35,7 +35,7 @@ from composer.runtime.system_executor import SystemExecutor
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from foxglove.websocket import ChannelView, Client, ClientChannel, Parameter
+    from foxglove.websocket import ChannelView, Client
     from rclpy.context import Context
 
     from composer.foxglove import BridgeOptions
@@ -63,7 +63,7 @@ class _Channel:
     base: foxglove.Channel
 
 
-class FoxgloveBridge(ServerListener):
+class FoxgloveBridge(GraphAccess):
     """Serves clients from `start` to `stop`; it is the recorder of what they subscribe to.
 
     Args:
@@ -82,9 +82,9 @@ class FoxgloveBridge(ServerListener):
     room, lost = 1, 0
 
     def __init__(self, options: BridgeOptions, name: str, log: Log) -> None:
+        super().__init__(allows_changes=options.allows_changes)
         self.queue: Any = self
         self._log = log
-        self._allows_changes = options.allows_changes
         self._address = _LOOPBACK if options.address in _ANY else options.address
         self._sink = foxglove.Context()
         self._channels: dict[tuple[str, str], _Channel] = {}
@@ -126,10 +126,9 @@ class FoxgloveBridge(ServerListener):
         Args:
             topics: Those of the system that runs in this process.
         """
-        self._executor = SystemExecutor(context, None, log=self._tell_error)
+        self._executor = SystemExecutor(context, None, log=self._log.error)
         self._node = create_graph_node(context, '_composer_foxglove')
         self._executor.add_node(self._node)
-        self._access = GraphAccess(self._node, self._server)
         self._executor.start()
         self._recorder.start(context, topics or LocalTopics(self._executor))
         self._thread.start()
@@ -148,9 +147,6 @@ class FoxgloveBridge(ServerListener):
             self._executor.stop(_STOP_SEC)
             self._node.destroy_node()
         self._server.stop()
-
-    def _tell_error(self, text: str) -> None:
-        self._log.error(text)
 
     def _warn_once(self, text: str) -> None:
         # Each message of a topic may have an error of its own.
@@ -242,7 +238,7 @@ class FoxgloveBridge(ServerListener):
         if self._allows_changes:
             self._show_services()
         if self._may_show_graph.is_set():
-            self._access.show_graph({topic for topic, _ in topics})
+            self.show_graph({topic for topic, _ in topics})
 
     def _show_services(self) -> None:
         services = {
@@ -252,7 +248,7 @@ class FoxgloveBridge(ServerListener):
         }
         for name in services.keys() - self._services:
             with suppress(ComposerError):
-                service = self._access.create_service(name, services[name], self._create_schema)
+                service = self.create_service(name, services[name], self._create_schema)
                 self._server.add_services([service])
         if gone := self._services - services.keys():
             self._server.remove_services(list(gone))
@@ -304,36 +300,6 @@ class FoxgloveBridge(ServerListener):
                     self._may_show_graph.set()
         self._may_show_graph.clear()
         self._watches_graph.clear()
-
-    def on_get_parameters(
-        self, _client: Client, param_names: list[str], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Return parameters by their names, as in `/arm.speed`; all if there are none."""
-        del request_id
-        return self._access.get_parameters(param_names)
-
-    def on_set_parameters(
-        self, _client: Client, parameters: list[Parameter], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Set parameters, and return what they are then."""
-        del request_id
-        if self._allows_changes:
-            self._access.set_parameters(parameters)
-        else:
-            self._access.refuse('parameters are set only with --allow-changes')
-        return self._access.get_parameters([each.name for each in parameters])
-
-    def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
-        """Have a publisher for a client."""
-        self._access.advertise((client.id, channel.id), channel.topic, channel.schema_name)
-
-    def on_client_unadvertise(self, client: Client, client_channel_id: int) -> None:
-        """Destroy it."""
-        self._access.unadvertise((client.id, client_channel_id))
-
-    def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
-        """Publish a message of a client."""
-        self._access.publish((client.id, client_channel_id), data)
 
 
 def _limit_stalls(port: int) -> None:

@@ -13,6 +13,7 @@ from foxglove.websocket import (
     ConnectionGraph,
     MessageSchema,
     Parameter,
+    ServerListener,
     Service,
     ServiceSchema,
     StatusLevel,
@@ -30,29 +31,31 @@ from composer.names import join_names
 from composer.recordings.definitions import import_message
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from foxglove.websocket import ServiceRequest, WebSocketServer
+    from foxglove.websocket import Client, ClientChannel, ServiceRequest, WebSocketServer
     from rclpy.node import Node
 
 _ANSWER_SEC: Final = 5.0
 _LIST: Final = '/list_parameters'
 
 
-class GraphAccess:
-    """A node that acts for clients; an executor spins it.
+class GraphAccess(ServerListener):
+    """What clients ask and do; `_node` acts for them on the graph, and an executor spins it.
 
-    Attributes:
-        graph: What clients were shown of it; `None` for nothing.
+    Args:
+        allows_changes: Whether clients may publish, call services and set parameters.
     """
 
-    def __init__(self, node: Node, server: WebSocketServer) -> None:
-        self._node = node
-        self._server = server
+    _node: Node
+    _server: WebSocketServer
+
+    def __init__(self, *, allows_changes: bool) -> None:
+        self._allows_changes = allows_changes
         self._clients: dict[str, Any] = {}
         self._publishers: dict[tuple[int, int], Any] = {}
         self._lock = threading.Lock()
-        self.graph: Any = None
+        self._graph: Any = None
 
     def refuse(self, reason: str) -> None:
         """Show clients why something is not done."""
@@ -69,9 +72,9 @@ class GraphAccess:
                         servers[service].append(join_names(namespace, name))
         published = {each: _nodes_of(node.get_publishers_info_by_topic(each)) for each in topics}
         heard = {each: _nodes_of(node.get_subscriptions_info_by_topic(each)) for each in topics}
-        if self.graph == (published, heard, servers):
+        if self._graph == (published, heard, servers):
             return
-        self.graph, graph = (published, heard, servers), ConnectionGraph()
+        self._graph, graph = (published, heard, servers), ConnectionGraph()
         for topic, nodes in published.items():
             graph.set_published_topic(topic, nodes)
         for topic, nodes in heard.items():
@@ -103,9 +106,15 @@ class GraphAccess:
                 done.wait(max(0.0, deadline - monotonic()))
             yield future.result() if future is not None and future.done() else None
 
-    def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
+    def on_get_parameters(
+        self, _client: Client, param_names: list[str], request_id: str | None = None
+    ) -> list[Parameter]:
         """Return parameters by their names, as in `/arm.speed`; all if there are none."""
-        values = self._read(names or self._list_parameters())
+        del request_id
+        return self._read_parameters(param_names or self._list_parameters())
+
+    def _read_parameters(self, names: Iterable[str]) -> list[Parameter]:
+        values = self._read(names)
         return [each for name, value in values.items() for each in _show(name, value)]
 
     def _list_parameters(self) -> list[str]:
@@ -129,26 +138,35 @@ class GraphAccess:
             if response is not None and response.values
         }
 
-    def set_parameters(self, parameters: Sequence[Parameter]) -> None:
-        """Set parameters; tell clients which are refused."""
-        given = {each.name: each.get_value() for each in parameters}
-        types = {name: value.type for name, value in self._read(given).items()}
-        wanted = _by_node((name, _fit(value, types.get(name))) for name, value in given.items())
+    def on_set_parameters(
+        self, _client: Client, parameters: Sequence[Parameter], request_id: str | None = None
+    ) -> list[Parameter]:
+        """Set parameters, and return what they are then; tell clients which are refused."""
+        del request_id
+        names = [each.name for each in parameters]
+        if not self._allows_changes:
+            self.refuse('parameters are set only with --allow-changes')
+            return self._read_parameters(names)
+        types = {name: value.type for name, value in self._read(names).items()}
         calls = []
-        for node, values in wanted.items():
-            messages = [
-                RosParameter(name, value=value).to_parameter_msg()
-                for name, value in values.items()
-            ]
-            request = SetParameters.Request(parameters=messages)
+        for parameter in parameters:
+            # Only parameters may have dots.
+            node, _, name = parameter.name.partition('.')
+            try:
+                ros = RosParameter(name, value=_fit(parameter, types)).to_parameter_msg()
+            except (AttributeError, TypeError, ValueError):
+                self.refuse(f'{parameter.name} was not set: it has no type of ROS')
+                continue
+            request = SetParameters.Request(parameters=[ros])
             calls.append((SetParameters, f'{node}/set_parameters', request))
-        for (node, values), response in zip(wanted.items(), self._call_all(calls), strict=True):
+        for (_, service, request), response in zip(calls, self._call_all(calls), strict=True):
+            node = service.removesuffix('/set_parameters')
             if response is None:
                 self.refuse(f'{node} does not answer')
-                continue
-            for name, result in zip(values, response.results, strict=True):
-                if not result.successful:
-                    self.refuse(f'{node}.{name} was not set: {result.reason}')
+            elif not response.results[0].successful:
+                name, reason = request.parameters[0].name, response.results[0].reason
+                self.refuse(f'{node}.{name} was not set: {reason}')
+        return self._read_parameters(names)
 
     def create_service(
         self, name: str, type_name: str, create_schema: Callable[[type], Any]
@@ -174,23 +192,24 @@ class GraphAccess:
             raise CallTimeoutError(message)
         return bytes(serialize_message(response))
 
-    def advertise(self, key: tuple[int, int], topic: str, type_name: str) -> None:
+    def on_client_advertise(self, client: Client, channel: ClientChannel) -> None:
         """Create a publisher for a client."""
         try:
-            publisher = self._node.create_publisher(import_message(type_name), topic, 10)
+            message_class = import_message(channel.schema_name)
+            publisher = self._node.create_publisher(message_class, channel.topic, 10)
         except Exception as error:  # noqa: BLE001 - rclpy raises many kinds for wrong names
-            self.refuse(f"'{topic}' cannot be published: {error}")
+            self.refuse(f"'{channel.topic}' cannot be published: {error}")
             return
-        self._publishers[key] = publisher
+        self._publishers[client.id, channel.id] = publisher
 
-    def unadvertise(self, key: tuple[int, int]) -> None:
+    def on_client_unadvertise(self, client: Client, client_channel_id: int) -> None:
         """Destroy the publisher of a client."""
-        if (publisher := self._publishers.pop(key, None)) is not None:
+        if (publisher := self._publishers.pop((client.id, client_channel_id), None)) is not None:
             self._node.destroy_publisher(publisher)
 
-    def publish(self, key: tuple[int, int], data: bytes) -> None:
+    def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
         """Publish a message of a client, in CDR."""
-        if (publisher := self._publishers.get(key)) is not None:
+        if (publisher := self._publishers.get((client.id, client_channel_id))) is not None:
             publisher.publish(data)
 
 
@@ -198,16 +217,6 @@ def _nodes_of(ends: Iterable[Any]) -> list[str]:
     """Return the nodes of publishers or subscriptions that are not hidden, as those of tools."""
     nodes = {join_names(each.node_namespace, each.node_name) for each in ends}
     return sorted(node for node in nodes if '/_' not in node)
-
-
-def _by_node(values: Iterable[tuple[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return values of `/arm.speed` by node and name."""
-    found: dict[str, dict[str, Any]] = {}
-    for full_name, value in values:
-        # Only parameters may have dots.
-        node, _, name = full_name.partition('.')
-        found.setdefault(node, {})[name] = value
-    return found
 
 
 def _show(name: str, value: Any) -> Iterator[Parameter]:
@@ -220,8 +229,10 @@ def _show(name: str, value: Any) -> Iterator[Parameter]:
         yield Parameter(name, value=native)
 
 
-def _fit(value: Any, type_number: int | None) -> Any:
+def _fit(parameter: Parameter, types: Mapping[str, int]) -> Any:
     """Return a value as the parameter has it: clients send whole numbers as integers."""
+    value: Any = parameter.get_value()
+    type_number = types.get(parameter.name)
     if isinstance(value, bytes):
         return [bytes([each]) for each in value]
     if type_number == ParameterType.PARAMETER_DOUBLE and isinstance(value, int):

@@ -54,7 +54,7 @@ class SystemExecutor(ComposerExecutor):
         self,
         context: Context,
         threads: int | None,
-        log: Callable[[str], None],
+        log: Callable[[str], object],
         on_lost: Callable[[], None] | None = None,
         on_broken: Callable[[str], None] | None = None,
         on_unanswered: Callable[[RequestFailure], None] | None = None,

@@ -226,6 +226,11 @@ def test_clients_change_the_system_where_they_may(start):
         names = ('/talker.speed', '/talker.gains', '/talker.mode')
         assert one.parameters(*names) == dict(zip(names, (1.5, [1.0, 2.0], 'slow'), strict=True))
         assert set(names) <= one.parameters().keys()
+        one.seen.clear()
+        one.send('setParameters', parameters=[{'name': '/talker.mode', 'value': {'a': 1}}])
+        refusal = one.wait_for_op('status')
+        assert refusal['message'] == '/talker.mode was not set: it has no type of ROS'
+        one.seen.clear()
         one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
         new = {'/talker.speed': 3, '/talker.gains': [4], '/talker.mode': 'fast', '/talker.no': 1}
         parameters = [{'name': name, 'value': value} for name, value in new.items()]
