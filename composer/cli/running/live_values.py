@@ -143,56 +143,37 @@ def echo(topic: str, field: str, *, once: bool, tells_rate: bool, timeout_sec: f
         graph.spin()
         ends = graph.node.get_publishers_info_by_topic(name)
         profile = match_offers(read_offer(each.qos_profile) for each in ends)
-        shown = _Rate() if tells_rate else _Messages(field)
-        graph.node.create_subscription(message_class, name, shown.take, profile)
-        if once and not graph.wait_for(lambda: shown.count):
+        times: list[float] = []
+
+        def take(message: Any) -> None:
+            times.append(monotonic())
+            if not tells_rate:
+                _show(_pick(message, field), is_document=not field)
+
+        told = monotonic()
+        graph.node.create_subscription(message_class, name, take, profile)
+        if once and not graph.wait_for(lambda: times):
             message = f"no message of '{name}' came within {timeout_sec:g} s"
             raise ComposerError(message, help=None if ends else 'nobody publishes it')
         while not (once or is_asked()):
             graph.spin()
-            shown.tell()
+            if (now := monotonic()) - told >= _REPORT_SEC:
+                if tells_rate:
+                    _tell_rate(times)
+                told = now
+                del times[:-1]
     return ExitCode.DONE
 
 
-class _Messages:
-    """Prints messages as YAML."""
-
-    def __init__(self, field: str) -> None:
-        self.count = 0
-        self._field = field
-
-    def take(self, message: Any) -> None:
-        _show(_pick(message, self._field), is_document=not self._field)
-        self.count += 1
-
-    def tell(self) -> None:
-        """There is no more to say."""
-
-
-class _Rate:
-    """Prints how often messages come."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._times: list[float] = []
-        self._told = monotonic()
-
-    def take(self, _message: Any) -> None:
-        self._times.append(monotonic())
-        self.count += 1
-
-    def tell(self) -> None:
-        if (now := monotonic()) - self._told < _REPORT_SEC:
-            return
-        times, self._told = self._times, now
-        self._times = times[-1:]
-        periods = [after - before for before, after in pairwise(times)]
-        if not periods:
-            click.echo('no message')
-            return
-        apart = f'{min(periods):.4f} to {max(periods):.4f} s apart'
-        rate = len(periods) / sum(periods)
-        click.echo(f'{rate:.2f} Hz: {count_of(len(periods), "message")}, {apart}')
+def _tell_rate(times: list[float]) -> None:
+    """Print how often messages have come at these times."""
+    periods = [after - before for before, after in pairwise(times)]
+    if not periods:
+        click.echo('no message')
+        return
+    apart = f'{min(periods):.4f} to {max(periods):.4f} s apart'
+    rate = len(periods) / sum(periods)
+    click.echo(f'{rate:.2f} Hz: {count_of(len(periods), "message")}, {apart}')
 
 
 def call(service: str, payload: str, timeout_sec: float) -> int:
