@@ -15,7 +15,7 @@ from composer.node_uses.names import Names
 from composer.node_uses.values import Class, External, Function, Instance, Made, Scope
 from composer.node_uses.waiting import FILLING
 from composer.python_source.modules import MOST_BASES
-from composer.python_source.syntax import list_nodes
+from composer.python_source.syntax import list_nodes, words_in
 
 if TYPE_CHECKING:
     from composer.diagnostics import Span
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 # A module, and a name in it, as in `Robot.pose`.
 SharedName: TypeAlias = tuple[str, str]
+_ASSIGNING = (ast.Assign, ast.AnnAssign)
 # A behaviour that calls more is too large to follow.
 _MOST_FUNCTIONS = 200
 # Methods of containers that change them.
@@ -111,20 +112,16 @@ class SharedNames:
             return None
         owner = self._names.value_of(node.value, scope)
         match owner:
-            case Class() if self._has_attribute(owner, node.attr):
-                return self._named(owner.module, f'{owner.definition.name}.{node.attr}')
+            case Class(module=module, definition=definition):
+                assigned = [each for each in definition.body if isinstance(each, _ASSIGNING)]
+                names = {name for each in assigned for name in words_in(each)}
+                if node.attr in names:
+                    return self._names.name_of(module), f'{definition.name}.{node.attr}'
             case Instance() if isinstance(node.value, ast.Name):
                 shared = self._shared(node.value, scope)
                 return (shared[0], f'{shared[1]}.{node.attr}') if shared else None
         home = self._names.module_of(node.value, scope)
         return self._of_module(home, node.attr) if home is not None else None
-
-    def _has_attribute(self, of: Class, name: str) -> bool:
-        return any(
-            isinstance(each, ast.Assign | ast.AnnAssign)
-            and name in {node.id for node in ast.walk(each) if isinstance(node, ast.Name)}
-            for each in of.definition.body
-        )
 
     def _of_module(self, module: ModuleSource, name: str) -> SharedName | None:
         for _ in range(MOST_BASES):
@@ -136,35 +133,24 @@ class SharedNames:
                     # The same object by another name.
                     module, name = home, other
                 case [(ast.Assign() | ast.AnnAssign(), _), *_]:
-                    return self._named(home, name)
+                    return self._names.name_of(home), name
                 case _:
                     return None
         return None
 
     def _changed_by(self, node: ast.AST, scope: Scope) -> list[ast.expr]:
-        """Return what a statement or call changes the inside of."""
+        """Return what a statement or call changes the inside of: of `D['a'].append(1)`, D, too."""
+        changed: list[ast.expr] = []
         match node:
             case ast.Call(func=ast.Attribute(value=owner, attr=method)):
                 value = self._names.value_of(owner, scope)
-                filling = (
-                    FILLING.get(value.kind, _CHANGING) if isinstance(value, Made) else _CHANGING
-                )
-                is_known = not isinstance(value, External)
-                return [owner, *_owners(owner)] if is_known and method in filling else []
+                kind = value.kind if isinstance(value, Made) else ''
+                if method in FILLING.get(kind, _CHANGING) and not isinstance(value, External):
+                    changed = [owner]
             case ast.Subscript(value=owner, ctx=ast.Store() | ast.Del()):
-                return [owner, *_owners(owner)]
+                changed = [owner]
             case ast.AugAssign(target=target):
                 return [target]
-        return []
-
-    def _named(self, module: ModuleSource, name: str) -> SharedName:
-        return self._names.name_of(module), name
-
-
-def _owners(node: ast.expr) -> list[ast.expr]:
-    """Return what an item belongs to: of `D['a'].append(1)`, D."""
-    found: list[ast.expr] = []
-    while isinstance(node, ast.Subscript):
-        node = node.value
-        found.append(node)
-    return found
+        while changed and isinstance(changed[-1], ast.Subscript):
+            changed.append(changed[-1].value)
+        return changed

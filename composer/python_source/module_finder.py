@@ -89,7 +89,13 @@ class ModuleFinder:
     def find(self, name: str) -> ModuleSource | MissingModule:
         """Return the module `package.module`, or the part of its name that is missing."""
         if name not in self._found:
-            self._found[name] = self._find(name)
+            missing, file = self.find_missing(name), self._locate(name).file
+            if missing is not None or file is None:
+                self._found[name] = missing or ModuleSource(None)
+            else:
+                module = read_module(file, self._tokens_left, self._before.get(file))
+                self._tokens_left -= module.tokens
+                self._found[name] = module
         return self._found[name]
 
     def list_read(self, search_path: list[Path]) -> dict[Path, ModuleSource]:
@@ -121,7 +127,12 @@ class ModuleFinder:
         if not located.missing:
             return None
         *done, part = located.missing.split('.')
-        nearest = self._nearest(part, done, located.folders)
+        for folder in located.folders:
+            if folder not in self._listed:
+                self._listed[folder] = _list_modules(folder)
+        known = {name for folder in located.folders for name in self._listed[folder]}
+        near = find_nearest(part, known)
+        nearest = '.'.join([*done, near]) if near else None
         return MissingModule(located.missing, nearest, self._find_hiding(done, part))
 
     def is_package(self, name: str) -> bool:
@@ -150,17 +161,6 @@ class ModuleFinder:
         top = name.partition('.')[0]
         return any(each.name == top and each.parent.name == 'share' for each in self._project)
 
-    def _find(self, name: str) -> ModuleSource | MissingModule:
-        missing = self.find_missing(name)
-        if missing is not None:
-            return missing
-        file = self._locate(name).file
-        if file is None:
-            return ModuleSource(None)
-        module = read_module(file, self._tokens_left, self._before.get(file))
-        self._tokens_left -= module.tokens
-        return module
-
     def _locate(self, name: str) -> _Location:
         if name not in self._located:
             self._located[name] = self._locate_anew(name)
@@ -186,13 +186,6 @@ class ModuleFinder:
         inside = Path(*done, f'{part}.py')
         is_elsewhere = file is not None and any(_is_there(root / inside) for root in self._roots)
         return file if is_elsewhere else None
-
-    def _nearest(self, part: str, done: list[str], folders: list[Path]) -> str | None:
-        for folder in folders:
-            if folder not in self._listed:
-                self._listed[folder] = _list_modules(folder)
-        near = find_nearest(part, {name for folder in folders for name in self._listed[folder]})
-        return '.'.join([*done, near]) if near else None
 
 
 def _locate(part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:

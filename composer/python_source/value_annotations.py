@@ -13,6 +13,7 @@ import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from composer.python_source.annotations import dotted_name
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -90,12 +91,15 @@ def _read(expression: ast.expr, value: Any, given: Mapping[str, Any]) -> Iterato
             yield from _read(expression.left, value, given)
             yield from _read(expression.right, value, given)
         case ast.Name(id=name) if name in _SCALARS:
-            yield WantedValue(name, _is_scalar(value, name))
-        case ast.Name() | ast.Attribute() if _last_name(expression) in _COLLECTIONS:
-            yield _read_collection(_last_name(expression), [], value, given)
+            types = _SCALARS[name]
+            fits = isinstance(value, types) and (bool in types or not isinstance(value, bool))
+            fits |= name == 'int' and isinstance(value, float) and value.is_integer()
+            yield WantedValue(name, fits)
+        case ast.Name(id=name) | ast.Attribute(attr=name) if name in _COLLECTIONS:
+            yield _read_collection(name, [], value, given)
         case ast.Subscript(value=form, slice=inner):
             items = inner.elts if isinstance(inner, ast.Tuple) else [inner]
-            yield from _read_form(_last_name(form), items, value, given)
+            yield from _read_form(dotted_name(form).rpartition('.')[2], items, value, given)
         case _:
             raise _UnknownAnnotationError
 
@@ -106,7 +110,8 @@ def _read_form(
     if name == 'Literal':
         for item in items:
             option = ast.literal_eval(item)
-            yield WantedValue(repr(option), _is_same(value, option), option)
+            is_same = value == option and isinstance(value, bool) == isinstance(option, bool)
+            yield WantedValue(repr(option), bool(is_same), option)
     elif name in ('Union', 'Optional'):
         for item in items:
             yield from _read(item, value, given)
@@ -160,20 +165,3 @@ def _comparison(sign: str, limit: float) -> Callable[[Any], bool]:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_scalar(value: Any, wanted: str) -> bool:
-    if wanted == 'int' and isinstance(value, float) and value.is_integer():
-        return True
-    types = _SCALARS[wanted]
-    return isinstance(value, types) and (bool in types or not isinstance(value, bool))
-
-
-def _is_same(value: Any, option: Any) -> bool:
-    return bool(value == option) and isinstance(value, bool) == isinstance(option, bool)
-
-
-def _last_name(expression: ast.expr) -> str:
-    if isinstance(expression, ast.Attribute):
-        return expression.attr
-    return expression.id if isinstance(expression, ast.Name) else ''

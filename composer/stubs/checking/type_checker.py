@@ -95,10 +95,8 @@ class TypeResult:
 def find_program() -> Path | None:
     """Return pyrefly: that beside Composer's own Python, or one on the `PATH`."""
     own = Path(sys.executable).parent / 'pyrefly'
-    on_path = None if own.exists() else shutil.which('pyrefly')
-    if on_path is not None:
-        return Path(on_path)
-    return own if own.exists() else None
+    found = str(own) if own.exists() else shutil.which('pyrefly')
+    return Path(found) if found else None
 
 
 def run_type_checker(
