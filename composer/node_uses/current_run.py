@@ -183,5 +183,5 @@ class Run:
             case ('node', method) if method in SENDING_METHODS:
                 reading.open_kinds.add(SENDING_METHODS[method])
             case ('node', method) if method in CREATING_METHODS:
-                noun = CREATING_METHODS[method][0]
-                reading.created.append(CreatedEntity(noun, None, None, None, None))
+                created = CreatedEntity(CREATING_METHODS[method], None, None, None, None)
+                reading.created.append(created)

@@ -131,7 +131,7 @@ def note_goal(run: Run, chain: Chain, call: ast.Call, scope: Scope, *, is_awaite
 def _note_created(
     run: Run, method: str, arguments: Mapping[str, ast.expr], scope: Scope
 ) -> Iterator[tuple[Function, list[Value | None]]]:
-    noun, _ = CREATING_METHODS[method]
+    noun = CREATING_METHODS[method]
     of_type = arguments.get('msg_type') or arguments.get('srv_type')
     channel = arguments.get('topic') or arguments.get('srv_name')
     _check_options(run, noun, arguments, scope)

@@ -22,14 +22,13 @@ if TYPE_CHECKING:
 Waited: TypeAlias = Literal['', 'answer', 'end']
 # The nouns of the kinds of entity that behaviours use by name, as in `service client`.
 USED_NOUNS = frozenset(kind.noun for kind in USED_KINDS)
-# The methods of the node that create an entity, the noun of its kind, and the position of its
-# behaviour, if it has one.
+# The methods of the node that create an entity, and the noun of its kind.
 CREATING_METHODS = {
-    'create_publisher': ('publisher', None),
-    'create_subscription': ('subscription', 2),
-    'create_timer': ('timer', 1),
-    'create_service': ('service', 2),
-    'create_client': ('service client', None),
+    'create_publisher': 'publisher',
+    'create_subscription': 'subscription',
+    'create_timer': 'timer',
+    'create_service': 'service',
+    'create_client': 'service client',
 }
 # The methods of the node that send something, and the noun of what they use by its name.
 SENDING_METHODS = {
