@@ -24,6 +24,17 @@ _SHORT: Final = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
 
+# What behaviours write that have a goal handle in rclpy.
+_OF_GOAL_HANDLES: Final = {
+    'abort': 'raise composer.AbortedError',
+    'canceled': 'return the result: the goal is canceled if that was asked for',
+    'is_cancel_requested': 'yield: a cancel request closes the generator there',
+    'publish_feedback': 'yield the feedback',
+    'request': 'this is the request',
+    'succeed': 'return the result',
+}
+
+
 class FieldError(ComposerError):
     """A field cannot hold a value.
 
@@ -55,6 +66,8 @@ def unknown_field(message_name: str, key: object, names: Iterable[str]) -> Field
     """Return the error for a key that is no field of its message."""
     names = tuple(names)
     advice = suggest(key, names)
+    if message_name.endswith('.Goal') and key in _OF_GOAL_HANDLES:
+        advice = f'{_OF_GOAL_HANDLES[str(key)]};'
     fields = f'its fields are {", ".join(names)}' if names else 'it has no fields'
     return FieldError(
         f'{message_name} has no field {key!r}',

@@ -47,6 +47,21 @@ _SIGNATURES = {
     'with_own_state': '',
 }
 NODE_METHODS = frozenset(_SIGNATURES)
+# What behaviours write for what rclpy's node has.
+OF_RCLPY = {
+    **{
+        name: f'write node.{name}'
+        for name in (
+            *('create_client', 'create_publisher', 'create_service', 'create_subscription'),
+            'create_timer',
+        )
+    },
+    'declare_parameter': "declare it under 'parameters:' of the node",
+    'get_clock': 'write node.now()',
+    'get_logger': 'write node.logger',
+    'get_name': 'write node.name',
+    'get_parameter': 'write node.parameters.NAME',
+}
 _PARTS = {'publish': '', 'call': '_Request', 'call_async': '_Request', 'send_goal': '_Goal'}
 
 

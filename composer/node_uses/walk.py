@@ -59,13 +59,9 @@ LOGGER_NAMES = frozenset(
         *('is_enabled_for', 'set_level', 'warn', 'warning'),
     }
 )
-# What behaviours write for methods of rclpy's node.
-_OF_RCLPY = {
-    'declare_parameter': "declare it under 'parameters:' of the node",
-    'get_logger': 'write node.logger',
-    'get_name': 'write node.name',
-    'get_parameter': 'write node.parameters.NAME',
-}
+_SPINNING = frozenset(
+    f'rclpy.{name}' for name in ('spin', 'spin_once', 'spin_until_future_complete')
+)
 _CLASSES_OF_RCLPY = {'Node', 'LifecycleNodeMixin', 'LifecycleNode'}
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 # Functions that keep nothing of what they are given.
@@ -722,8 +718,8 @@ class Walk:
         self, owner: str, name: str, known: frozenset[str], node: ast.expr, scope: Scope
     ) -> None:
         help_text = suggest(name, known, 'it has')
-        if owner == 'the node' and (name in _OF_RCLPY or name in _ros_members()):
-            help_text = _OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
+        if owner == 'the node' and (name in node_calls.OF_RCLPY or name in _ros_members()):
+            help_text = node_calls.OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
         text = f"{owner} has no attribute '{name}'"
         self.run.report('unknown-attribute', scope.module, node, text, help_text)
 
@@ -801,6 +797,12 @@ class Walk:
                     return
             case External(name='time.sleep') if call.args:
                 waiting.note_sleep(self.run, call.args[0], call, scope)
+            case External(name=name) if name in _SPINNING and call.args:
+                spun = self._names.value_of(call.args[0], scope)
+                if spun in (Chain(('node',)), Chain(('node', 'ros'))):
+                    text = f'{name} would spin a node that the system spins already'
+                    help_text = 'wait with node.call, node.send_goal, await or node.sleep'
+                    self.run.report('bad-call', scope.module, call, text, help_text)
             case External(name='composer.AbortedError'):
                 for node in call.args[1:2]:
                     payload = Payload('', 'aborted', '', node, scope.module, self.run.is_certain)

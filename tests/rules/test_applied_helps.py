@@ -166,19 +166,22 @@ OF_RCLPY = {
     "print(node.get_parameter('speed').value)": 'write node.parameters.NAME',
     "node.declare_parameter('speed', 1.0)": "declare it under 'parameters:' of the node",
     'print(node.get_name())': 'write node.name',
-    'print(node.get_clock().now())': "did you mean 'ros.get_clock'?",
+    'print(node.get_clock().now())': 'write node.now()',
     'print(node.count_publishers("/x"))': "did you mean 'ros.count_publishers'?",
     'print(node.nmae)': "did you mean 'name'?",
     'print(message.K)': "did you mean 'k'?",
     'await asyncio.sleep(1)': 'call time.sleep, in a group of its own; in a timer, write a '
     'generator',
+    'rclpy.spin_once(node)': 'wait with node.call, node.send_goal, await or node.sleep',
+    'rclpy.spin_until_future_complete(node.ros, message)': 'wait with node.call, node.send_goal, '
+    'await or node.sleep',
 }
 HEARING = """version: 1
 nodes:
   n:
     parameters: {speed: 1.0}
     subscriptions:
-      info: {type: sensor_msgs/msg/CameraInfo, external: true, behaviour: 'habits:hear'}
+      info: {type: sensor_msgs/msg/CameraInfo, external: true, behaviour: 'habits:Ear.hear'}
 """
 
 
@@ -186,9 +189,9 @@ nodes:
 @pytest.mark.parametrize(('line', 'said'), OF_RCLPY.items(), ids=range(len(OF_RCLPY)))
 def test_a_habit_of_rclpy_is_an_error_with_what_to_write(tmp_path, monkeypatch, line, said):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr('sys.dont_write_bytecode', True)
     Path('habits.py').write_text(
-        f'import asyncio\n\n\nasync def hear(node, message):\n    {line}\n'
+        'import asyncio\nimport rclpy\n\n\n'
+        f'class Ear:\n    async def hear(self, node, message):\n        {line}\n'
     )
     Path('bad.yaml').write_text(HEARING)
     (finding,) = (each for each in check(Path('bad.yaml')) if each.file == 'habits.py')

@@ -14,6 +14,7 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
+from composer.node_uses.node_calls import OF_RCLPY
 from composer.python_source.syntax import words_in
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
@@ -170,8 +171,15 @@ class TypeFindings:
         is_part = owner in ('Coroutine', *_PARTS)
         if owner in self.own or not (is_part or owner in self.messages or of_node in self.nodes):
             # A class of the project, or of Python: only what is misspelt is certain.
-            if not meant or name in self.defined or not is_typo(name, meant[1]):
+            is_typo_of = meant and name not in self.defined and is_typo(name, meant[1])
+            # What a name of the state stands for may change.
+            is_value = owner in _SCALARS and '.state.' not in ast.unparse(node)
+            if is_value and isinstance(node.value, ast.Attribute):
+                is_typo_of = is_typo_of or self._is_of_one_type(place, node.value)
+                advice = 'this is the value itself' if name == 'value' else advice
+            if not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
                 return None
+            advice = OF_RCLPY.get(name, advice)
             return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
         if not self._is_of_one_type(place, node.value):
             return None
@@ -186,6 +194,30 @@ class TypeFindings:
             rule, advice = 'missing-await', 'put await before the call'
             message = f"'{name}' is read of a coroutine, which has not been awaited"
         return node, rule, message, advice
+
+    def _is_set_by_nobody(self, place: ReportedPlace, owner: str, node: ast.Attribute) -> bool:
+        """Return whether an attribute of the object itself is set nowhere in the project.
+
+        The object is made of just this class, as the file names it.
+        """
+        tree = place.syntax.copy.module.tree
+        names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
+        bound = {(each.module, each.class_name) for each in names}
+        function = place.function
+        receiver = function.args.args[0].arg if function and function.args.args else ''
+        classes = [each for each in ast.walk(tree) if isinstance(each, ast.ClassDef)]
+        return (
+            (place.syntax.copy.module.name, owner) in bound
+            and isinstance(node.value, ast.Name)
+            and node.value.id == receiver
+            and node.attr not in self.defined
+            and 'setattr' not in self.defined
+            and not any(each.name == owner and each.decorator_list for each in classes)
+            and not any(
+                getattr(base, 'id', '') == owner for each in classes for base in each.bases
+            )
+            and any(function in each.body for each in classes if each.name == owner)
+        )
 
     def _unknown_name(self, owner: str, name: str, node: ast.expr) -> _Problem:
         of_node = owner.removesuffix('Parameters').removesuffix('State')
@@ -442,6 +474,9 @@ class TypeFindings:
     def _count(self, place: ReportedPlace) -> _Problem | None:
         function = _FUNCTION.search(place.report.message)
         match = _MESSAGE.match(function[1]) if function else None
+        if function and function[1].startswith('composer_stubs.Logger.') and place.calls:
+            advice = "put the values into it: f'{value}'"
+            return place.calls[0], 'bad-call', 'the logger takes one text', advice
         if match is None or match[4] != '__init__' or not place.calls:
             return None
         full_name = in_python(f'{match[1]}/{match[2]}/{match[3]}')

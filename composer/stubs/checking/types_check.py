@@ -142,7 +142,8 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
     """Return the names of classes of which the stubs do not tell all, and all that are defined.
 
     The first are classes that the modules define, import from anywhere but ROS, or add attributes
-    to; the second all names that their code may give to something.
+    to; the second all names that their code may give to something,
+    with `setattr` for any name.
     """
     own: set[str] = set()
     defined: set[str] = set()
@@ -159,6 +160,9 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
                     own |= {owner.id} if isinstance(owner, ast.Name) else set()
                 case ast.Constant(value=str(name)):
                     defined.add(name)
+                case ast.Name(id='setattr' | 'vars') | ast.Attribute(attr='__dict__'):
+                    # Any name.
+                    defined.add('setattr')
     return frozenset(own), frozenset(defined)
 
 
