@@ -145,7 +145,8 @@ def test_many_that_refer_to_themselves_do_not_use_up_the_descriptors(context: Co
         executor: Any = ComposerExecutor(context=context)
         executor.itself = executor
         executor.spin_once(0)
-        assert len(held()) - before < 300
+        # Three each, of a hundred; without the collection it would come to 600.
+        assert len(held()) - before < 400
 
 
 def test_a_node_goes_on_in_another_executor_after_its_own_was_dropped(context: Context) -> None:

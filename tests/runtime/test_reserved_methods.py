@@ -28,7 +28,7 @@ def shutdown_executor(node):
     node.ros.executor.shutdown()
 
 def spin(node):
-    rclpy.spin_once(node.ros, timeout_sec=0.1)
+    rclpy.spin_once(node.ros, timeout_sec=0.1)  # composer: ignore[bad-call]
 
 async def destroy_node_async(node):
     node.ros.destroy_node()
