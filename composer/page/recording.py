@@ -53,10 +53,12 @@ class Recording:
             start_parameter_services=False,
         )
         graph = GraphRecorder(node, recorder, patterns, self.warning)
-        self._end.callback(lambda: recorder.finish(patterns.describe_unused(graph.topics)))
-        self._end.callback(node.destroy_node)
-        self._end.callback(graph.stop)
-        graph.start()
+        with ExitStack() as end:
+            end.callback(lambda: recorder.finish(patterns.describe_unused(graph.topics)))
+            end.callback(node.destroy_node)
+            end.callback(graph.stop)
+            graph.start()
+            self._end = end.pop_all()
         self.target = str(target)
         return f"recording to '{target}'"
 
