@@ -151,6 +151,7 @@ def _call_service(client: Client, service: str, text: str, _: str) -> str:
 
 
 def _publish(client: Client, topic: str, text: str, _: str) -> str:
+    from rclpy.duration import Duration
     from rclpy.qos import DurabilityPolicy, QoSProfile
 
     from composer.recordings.definitions import import_message
@@ -167,8 +168,8 @@ def _publish(client: Client, topic: str, text: str, _: str) -> str:
         while ros.get_subscription_count() < len(ends) and monotonic() < deadline:
             client.executor.spin_once(timeout_sec=0.05)
         ros.publish(message)
-        # Else it would be gone before all have it.
-        ros.wait_for_all_acked()
+        # Else it would be gone before all have it; one that takes nothing holds nobody up.
+        ros.wait_for_all_acked(Duration(seconds=_ANSWER_SEC))
     finally:
         client.node.destroy_publisher(ros)
     return f'published, to {len(ends)} subscriptions'

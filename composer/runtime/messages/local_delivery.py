@@ -83,17 +83,14 @@ class LocalPublisher:
         self._limited: tuple[Inbox, ...] = ()
         self._size = _NOWHERE
 
-    @property
-    def outside(self) -> int:
-        """How many subscriptions listen that are not the system's own."""
-        return max(0, self._count() - self._size)
-
     def delivery(self) -> tuple[str, str]:
         """Return which way messages go now: `local` or `sent`, if anywhere; and why sent."""
         try:
-            listening, outside = self._count(), self.outside
+            # Other threads ask: it may be destroyed meanwhile, but not within this call.
+            listening = self.ros.get_subscription_count()
         except InvalidHandle:
-            return '', ''  # It is being destroyed.
+            return '', ''
+        outside = max(0, listening - self._size)
         if not listening:
             return '', ''
         if self.reason or not outside:

@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Int32
 
 from composer.cli.main import run
+from composer.runtime.messages.local_delivery import LocalPublisher
 
 pytestmark = pytest.mark.ros
 
@@ -116,3 +117,13 @@ async def call(node):
         return none == {'nowhere', 'far'} and min(rates['near'], rates['kept']) > rates['ask']
 
     wait_for(have_rates, 'the rates')
+
+
+def test_a_publisher_that_is_gone_has_nobody_who_listens(node):
+    """Who measures asks in a thread of its own, and must bear that a node goes meanwhile."""
+    ros = node.create_publisher(Int32, 'said', 1)
+    local = LocalPublisher(node, ros, is_local=True, returns=False)
+    node.create_subscription(Int32, 'said', lambda message: None, 1)
+    assert local.delivery()[0] == 'sent'
+    node.destroy_publisher(ros)
+    assert local.delivery() == ('', '')
