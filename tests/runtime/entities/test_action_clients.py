@@ -98,62 +98,64 @@ async def hear_async(node, feedback):
 async def take_async(node, result):
     take(node, result)
 
-def wait_for_result(node, *_):
-    goal = node.send_goal('act', {'order': 1}, timeout=30)
+def wait_for_result(node, order=1):
+    goal = node.send_goal('act', {'order': order}, timeout=30)
     node.logger.info('waiting')
     goal.result(timeout=None)
 
-async def wait_for_result_async(node, *_):
+async def wait_for_result_async(node):
     goal = node.send_goal('act', {'order': 1}, timeout=30)
     node.logger.info('waiting')
     await goal.result_async()
 
-def wait_for_feedback(node, *_):
+def wait_for_feedback(node):
     goal = node.send_goal('act', {'order': 1}, timeout=30)
     node.logger.info('waiting')
     for _ in goal.feedback:
         pass
 
-def wait_for_server(node, *_):
+def stay(node):
+    goal = node.send_goal('act', {'order': 2}, timeout=30)
+    for feedback in goal.feedback:
+        if list(feedback.sequence) == [9]:
+            node.logger.info('feedback comes')
+    try:
+        goal.result()
+    except composer.ActionNotAvailableError as error:
+        node.logger.info(f'{goal.status}: {error}')
+
+def wait_for_server(node):
     node.logger.info('waiting')
     node.send_goal('act', {'order': 1}, timeout=None)
 """
 
 
-def acting(behaviour, *, server=None, client='', more=''):
-    """Return a system whose client does this once; `server` is its action's behaviour."""
-    clients = {'client': {'behaviour': behaviour, 'client': client, 'more': more}}
-    return acting_together(clients, {} if server is None else {'act': server})
+def acting(clients, actions=None):
+    """Return a system of clients: the keys of each, and those of its action client `act`.
 
-
-def acting_together(clients, actions):
-    """Return a system of several clients: the action of each is `act`, if it names no other.
-
-    `actions` are those of its server: their behaviours by their names.
+    Args:
+        actions: The behaviours of the server's actions, by their names.
     """
-    lines = """
-        version: 1
-        nodes:
-"""
-    for name, keys in clients.items():
+    lines = 'version: 1\nnodes:\n'
+    for name, (keys, action) in clients.items():
         lines += f"""
-          {name}:
-            state: {{inside: 0}}
-            action_clients: {{act: {{type: test_msgs/action/Fibonacci{keys.get('client', '')}}}}}
-            timers:
-              tick: {{period: 0.02, behaviour: 'parts:{keys['behaviour']}'{keys.get('with', '')}}}
-              {keys.get('more', '')}
-    """
+  {name}:
+    state: {{inside: 0}}
+    action_clients: {{act: {{type: test_msgs/action/Fibonacci{action}}}}}
+    {keys}
+"""
     if actions:
-        lines += """
-          server:
-            actions:
-"""
-    for name, behaviour in actions.items():
-        lines += f"""
-              {name}: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{behaviour}'}}
-    """
+        lines += '  server:\n    actions:\n'
+        lines += ''.join(
+            f"      {name}: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{behaviour}'}}\n"
+            for name, behaviour in actions.items()
+        )
     return lines
+
+
+def ticking(behaviour, more=''):
+    """Return a timer that does something; `more` are other keys of it, and other timers."""
+    return f"timers: {{tick: {{period: 0.02, behaviour: 'parts:{behaviour}'{more or '}'}}}"
 
 
 class PlainServer:
@@ -233,138 +235,92 @@ def plain_server(domain_id):
     server.close()
 
 
-SENDERS = {'sync': {'behaviour': 'send'}, 'coroutine': {'behaviour': 'send_async'}}
-ENDS = {'sync': 'end: [[0], [1], [2]] [3] succeeded', 'coroutine': 'end: [3] succeeded'}
+SENDERS = {'sync': (ticking('send'), ''), 'coroutine': (ticking('send_async'), '')}
+ALONE = "}, other: {period: 0.003, behaviour: 'parts:alone'}"
+CLIENTS = {
+    **SENDERS,
+    'cancelling': (ticking('cancel'), ', action: forever'),
+    'refused': (ticking('send_and_tell'), ', action: refused'),
+    'missing': (ticking('send_and_tell', ', with: {timeout: 0.2}}'), ', action: missing'),
+    'slow': (ticking('send_and_tell', ', with: {patience: 0.2}}'), ', action: forever'),
+    'failing': (ticking('send_and_tell'), ', action: failing'),
+    'hearing': (ticking('send_only', ALONE), ', feedback: parts:hear, result: parts:take'),
+    'hearing_async': (
+        ticking('send_only', ALONE),
+        ', feedback: parts:hear_async, result: parts:take_async',
+    ),
+    'aborted': (ticking('send_only'), ', action: failing, result: parts:take'),
+}
+ACTIONS = {
+    'act': 'count',
+    'refused': "count', accept: 'parts:refuse",
+    'forever': "forever', concurrency: 'parallel",
+    'failing': "fail', concurrency: 'parallel",
+}
+ENDS = {
+    'sync': 'end: [[0], [1], [2]] [3] succeeded',
+    'coroutine': 'end: [3] succeeded',
+}
+TOLD = {
+    **ENDS,
+    'cancelling': 'end: executing True canceled',
+    'refused': "GoalRejectedError: the server of '/refused' refused the goal",
+    'missing': "ActionNotAvailableError: no server of the action '/missing' appeared within 0.2 s",
+    'slow': "GoalTimeoutError: the goal of '/forever' did not end within 0.2 s",
+    'failing': 'end: aborted',
+    'aborted': 'result: []',
+}
 
 
-def test_a_goal_of_this_process_has_feedback_and_a_result(compose):
-    child = compose(acting_together(SENDERS, {'act': 'count'}), CODE)
+def test_goals_of_this_process_tell_how_they_end(compose):
+    child = compose(acting(CLIENTS, ACTIONS), CODE)
+    for name, line in TOLD.items():
+        child.wait_for_line(f'[INFO] [{name}]: {line}')
+    child.wait_for_line("[WARN] [cancelling]: the goal of '/forever' was canceled")
+    child.wait_for_line("[WARN] [aborted]: the goal of '/failing' was aborted")
+    # They hear all in order, and never beside others.
+    for name in ('hearing', 'hearing_async'):
+        child.wait_for_line(f'[{name}]: result: ')
+        told = [line.partition(f'[{name}]: ')[2] for line in child.matching(f'[{name}]: ')]
+        assert told == [*(f'feedback: [{step}]' for step in range(5)), 'result: [5]']
+    assert child.stop() == 0
+    for name, line in TOLD.items():
+        assert f'[INFO] [{name}]: {line}' in child.lines
 
+
+def test_goals_of_a_plain_server_have_feedback_and_results_and_a_signal_ends_them(
+    compose, plain_server
+):
+    # The plain server runs even orders until they are cancelled.
+    waiting = ticking('wait_for_result', ', with: {order: 2}}')
+    child = compose(acting({**SENDERS, 'waiting': (waiting, '')}), CODE)
     for name, end in ENDS.items():
         assert child.wait_for_line(f'[{name}]: end: ') == f'[INFO] [{name}]: {end}'
-    assert child.stop() == 0
-
-
-def test_a_goal_of_a_plain_server_has_feedback_and_a_result(compose, plain_server):
-    child = compose(acting_together(SENDERS, {}), CODE)
-
-    for name, end in ENDS.items():
-        assert child.wait_for_line(f'[{name}]: end: ') == f'[INFO] [{name}]: {end}'
-    assert child.stop() == 0
+    check_that_a_signal_ends_it(child)
 
 
 def test_a_goal_ends_when_its_server_has_gone(compose, plain_server):
-    child = compose(
-        acting('stay', client=", result: 'parts:take'"),
-        CODE
-        + """
-def stay(node):
-    goal = node.send_goal('act', {'order': 2}, timeout=30)
-    for feedback in goal.feedback:
-        if list(feedback.sequence) == [9]:
-            node.logger.info('feedback comes')
-    try:
-        goal.result()
-    except composer.ActionNotAvailableError as error:
-        node.logger.info(f'{goal.status}: {error}')
-""",
-    )
+    child = compose(acting({'client': (ticking('stay'), ', result: parts:take')}), CODE)
     child.wait_for_line('feedback comes')
     plain_server.vanish()
     child.wait_for_line("[client]: unknown: the action server '/act' ended before the goal did")
     assert child.stop() == 0
 
 
-def test_a_goal_can_be_cancelled(compose):
-    child = compose(acting('cancel', server='forever'), CODE)
-
-    assert child.wait_for_line('end: ') == '[INFO] [client]: end: executing True canceled'
-    child.wait_for_line("[WARN] [client]: the goal of '/act' was canceled")
-    assert child.stop() == 0
-
-
-ERRORS = {
-    'refused': ('', "GoalRejectedError: the server of '/refused' refused the goal"),
-    'missing': (
-        ', with: {timeout: 0.2}',
-        "ActionNotAvailableError: no server of the action '/missing' appeared within 0.2 s",
-    ),
-    'slow': (
-        ', with: {patience: 0.2}',
-        "GoalTimeoutError: the goal of '/slow' did not end within 0.2 s",
-    ),
-    'failing': ('', 'end: aborted'),
-}
-SERVERS = {
-    'refused': "count', accept: 'parts:refuse",
-    'slow': 'forever',
-    'failing': 'fail',
-}
-
-
-def test_a_client_is_told_why_a_goal_does_not_succeed(compose):
-    clients = {
-        kind: {
-            'behaviour': 'send_and_tell',
-            'client': f', action: {kind}',
-            'with': arguments,
-        }
-        for kind, (arguments, _) in ERRORS.items()
-    }
-    child = compose(acting_together(clients, SERVERS), CODE)
-
-    for kind, (_, message) in ERRORS.items():
-        child.wait_for_line(f'[INFO] [{kind}]: {message}')
-    assert child.stop() == 0
-    for kind, (_, message) in ERRORS.items():
-        assert f'[INFO] [{kind}]: {message}' in child.lines
-
-
-def test_feedback_and_result_behaviours_hear_all_in_order_and_never_beside_others(compose):
-    clients = {
-        name: {
-            'behaviour': 'send_only',
-            'client': f", feedback: 'parts:{hear}', result: 'parts:{take}'",
-            'more': "other: {period: 0.003, behaviour: 'parts:alone'}",
-        }
-        for name, hear, take in (
-            ('plain', 'hear', 'take'),
-            ('coroutine', 'hear_async', 'take_async'),
-        )
-    }
-    child = compose(acting_together(clients, {'act': 'count'}), CODE)
-    for name in clients:
-        child.wait_for_line(f'[{name}]: result: ')
-
-    for name in clients:
-        told = [line.partition(f'[{name}]: ')[2] for line in child.matching(f'[{name}]: ')]
-        assert told == [*(f'feedback: [{step}]' for step in range(5)), 'result: [5]']
-    assert child.stop() == 0
-
-
-def test_the_result_behaviour_hears_of_an_aborted_goal_too(compose):
-    child = compose(acting('send_only', server='fail', client=", result: 'parts:take'"), CODE)
-    child.wait_for_line("[WARN] [client]: the goal of '/act' was aborted")
-    child.wait_for_line('[client]: result: []')
-
-
 WAITING = ['wait_for_result', 'wait_for_result_async', 'wait_for_feedback', 'wait_for_server']
 
 
 def test_a_signal_ends_timers_that_wait_for_goals(compose):
-    clients = {behaviour: {'behaviour': behaviour} for behaviour in WAITING}
-    clients['wait_for_server']['client'] = ', action: missing'
-    child = compose(acting_together(clients, {'act': 'forever'}), CODE)
+    clients = {each: (ticking(each), '') for each in WAITING}
+    clients['wait_for_server'] = ticking('wait_for_server'), ', action: missing'
+    child = compose(acting(clients, {'act': 'forever'}), CODE)
     check_that_a_signal_ends_it(child, waiting=len(WAITING))
 
 
-@pytest.mark.parametrize('behaviour', WAITING)
+@pytest.mark.parametrize('behaviour', ['wait_for_result_async', 'wait_for_feedback'])
 def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
-    text = acting(behaviour, server=None if behaviour == 'wait_for_server' else 'forever')
-    text = text.replace('timers:\n', f'on_start: parts:{behaviour}\n').replace(
-        f"              tick: {{period: 0.02, behaviour: 'parts:{behaviour}'}}\n", ''
-    )
-    check_that_a_signal_ends_it(compose(text, CODE), code=130)
+    clients = {'client': (f'on_start: parts:{behaviour}', '')}
+    check_that_a_signal_ends_it(compose(acting(clients, {'act': 'forever'}), CODE), code=130)
 
 
 def check_that_a_signal_ends_it(child, waiting=1, code=0):
@@ -373,20 +329,3 @@ def check_that_a_signal_ends_it(child, waiting=1, code=0):
     assert child.stop(signal.SIGINT) == code, child.output
     assert 'rror' not in child.output
     assert 'did not end' not in child.output
-
-
-def test_a_signal_ends_a_wait_for_a_goal_of_a_plain_server(compose, plain_server):
-    child = compose(
-        acting('wait_for_result').replace('parts:', 'parts:even_'),
-        CODE
-        + """
-def even_wait_for_result(node):
-    goal = node.send_goal('act', {'order': 2}, timeout=30)
-    node.logger.info('waiting')
-    goal.result(timeout=None)
-""",
-    )
-    child.wait_for_line('waiting')
-
-    assert child.stop(signal.SIGINT) == 0, child.output
-    assert 'rror' not in child.output
