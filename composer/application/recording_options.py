@@ -67,7 +67,11 @@ class RecordingOptions:
         page = self._start_page(name)
         try:
             if self.target is not None:
-                recorders.append(_create_recorder(self.target, self.topics))
+                # These import rclpy.
+                from composer.recordings.system_recorder import create_recorder
+                from composer.runtime.logs import system_logger
+
+                recorders.append(create_recorder(self.target, self.topics, system_logger))
             if self.bridge is not None:
                 recorders.append(create_bridge(self.bridge, name))
             yield recorders
@@ -110,19 +114,6 @@ class Recorders(list['SystemRecorder']):
         """See `SystemRecorder`."""
         for recorder in self:
             recorder.stop()
-
-
-def _create_recorder(target: Path, topics: Sequence[str]) -> SystemRecorder:
-    # These import rclpy.
-    from composer.recordings.recorder import Recorder
-    from composer.recordings.recording_place import find_place
-    from composer.recordings.system_recorder import SystemRecorder
-    from composer.recordings.topic_patterns import TopicPatterns
-    from composer.runtime.logs import system_logger
-
-    patterns = TopicPatterns(topics)
-    recorder = Recorder(find_place(target), system_logger)
-    return SystemRecorder(recorder, patterns, system_logger.warning)
 
 
 def create_bridge(options: BridgeOptions, name: str) -> FoxgloveBridge:

@@ -13,6 +13,7 @@ from composer.language.qos import (
     QosError,
     resolve_qos,
     settle_best_available,
+    why_sent,
 )
 from composer.language.qos_conflicts import find_qos_conflicts
 from composer.records import record
@@ -26,13 +27,6 @@ if TYPE_CHECKING:
 
 Way: TypeAlias = Literal['local', 'sent', 'both', '']
 
-# The values of policies with which messages may be handed over; any other is the middleware's.
-_KEPT_LOCALLY = {
-    'durability': ('volatile',),
-    'history': ('keep_last', 'keep_all'),
-    'reliability': ('reliable', 'best_effort'),
-    'liveliness': ('automatic', 'system_default'),
-}
 _TURNED_OFF = 'local_delivery: false'
 OUTSIDE: Final = 'external: true'
 # One end is in an external process.
@@ -69,19 +63,6 @@ def deliveries_of(
         yield from _of_topic(channel, profiles)
     else:
         yield from _of_calls(channel, profiles)
-
-
-def why_sent(policies: Mapping[str, Any]) -> str:
-    """Return which policy only the middleware keeps; empty if there is none."""
-    for name, values in _KEPT_LOCALLY.items():
-        if policies[name] not in values:
-            return f'{name}: {policies[name]}'
-    limits = (name for name in ('deadline', 'lifespan') if _is_limit(policies.get(name)))
-    return next(limits, '')
-
-
-def _is_limit(duration: object) -> bool:
-    return isinstance(duration, int | float)
 
 
 def _of_topic(

@@ -36,40 +36,31 @@ class FindingPlaces:
         self._channel_of_end: dict[DataPath, Channel] = {
             end.path: channel for channel in topology.channels.values() for end in channel.ends
         }
-        self._nodes: dict[DataPath, list[int]] = defaultdict(list)
-        self._edges: dict[DataPath, list[int]] = defaultdict(list)
-        self._channels: dict[ChannelKey, list[int]] = defaultdict(list)
+        # The keys of a dictionary, as one finding may be at a part several times.
+        self._places: dict[DataPath | ChannelKey, dict[int, None]] = defaultdict(dict)
         for index, finding in enumerate(findings):
             self._place(index, finding)
 
-    def of_node(self, path: DataPath) -> tuple[int, ...]:
-        """Return the findings of the node or process at a path."""
-        return _unique(self._nodes.get(path, []))
-
-    def of_edge(self, path: DataPath) -> tuple[int, ...]:
-        """Return the findings of the end at a path, such as a publisher."""
-        return _unique(self._edges.get(path, []))
-
-    def of_channel(self, key: ChannelKey) -> tuple[int, ...]:
-        """Return the findings of a topic, service or action."""
-        return _unique(self._channels.get(key, []))
+    def of(self, part: DataPath | ChannelKey) -> tuple[int, ...]:
+        """Return the findings of a node, a process or an end by its path, or of a channel."""
+        return tuple(self._places.get(part, ()))
 
     def _place(self, index: int, finding: Diagnostic) -> None:
         paths = self._paths.at(finding.span) if finding.span else []
         ends = [_end_of(path) for path in paths if self._is_end(path)]
-        ends = self._named_by(finding, ends)
+        # Of several ends written in one place, those whose channel the finding names.
+        named = [end for end in ends if f"'{self._channel_of_end[end].name}'" in finding.message]
+        ends = named or ends
         for end in ends:
-            if finding.rule in _OF_CHANNELS:
-                channel = self._channel_of_end[end]
-                self._channels[channel.kind, channel.name].append(index)
-            else:
-                self._edges[end].append(index)
+            channel = self._channel_of_end[end]
+            is_of_channel = finding.rule in _OF_CHANNELS
+            self._places[(channel.kind, channel.name) if is_of_channel else end][index] = None
         rule = load_rule(finding.rule)
         if rule.family == 'wiring' and rule.severity is Severity.ERROR:
             self._place_partners(index, finding, ends)
         if not ends:
             for path in paths:
-                self._nodes[path[:_NODE]].append(index)
+                self._places[path[:_NODE]][index] = None
 
     def _place_partners(self, index: int, finding: Diagnostic, ends: Sequence[DataPath]) -> None:
         """Add a finding on wiring to the other ends that it names."""
@@ -78,17 +69,12 @@ class FindingPlaces:
             for path in self._paths.at(related.span):
                 partner = _end_of(path)
                 if id(self._channel_of_end.get(partner)) in channels:
-                    self._edges[partner].append(index)
+                    self._places[partner][index] = None
 
     def _is_end(self, path: DataPath) -> bool:
         end = _end_of(path)
         inner = path[len(end) : len(end) + 1]
         return end in self._channel_of_end and not _OF_BEHAVIOURS.intersection(inner)
-
-    def _named_by(self, finding: Diagnostic, ends: list[DataPath]) -> list[DataPath]:
-        """Return the ends whose channel the finding names, of several written in one place."""
-        named = [end for end in ends if f"'{self._channel_of_end[end].name}'" in finding.message]
-        return named or ends
 
 
 class _PathFinder:
@@ -120,7 +106,3 @@ def _end_of(path: DataPath) -> DataPath:
         ('components',),
     )
     return path[: _ENTITY + 2 if is_inside else _ENTITY]
-
-
-def _unique(indices: list[int]) -> tuple[int, ...]:
-    return tuple(dict.fromkeys(indices))

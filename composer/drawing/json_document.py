@@ -43,9 +43,8 @@ from typing import TYPE_CHECKING, Any
 from composer.diagnostics import relative_path
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic, Span
-    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
-    from composer.yaml_text.positions import DataPath
+    from composer.diagnostics import Diagnostic
+    from composer.drawing.picture import Box, Edge, Picture, Wait
 
 _VERSION = 1
 
@@ -57,64 +56,46 @@ def render_picture(picture: Picture) -> str:
 
 def describe_picture(picture: Picture) -> dict[str, Any]:
     """Return a picture as plain data, of the form that this module's docstring gives."""
+
+    def describe(part: Box | Edge | Wait, names: str = '', **more: Any) -> dict[str, Any]:
+        """Return some attributes of a part, and its place."""
+        source = (span := picture.positions.key(part.path)).source
+        # A value of --set is in no file.
+        file = relative_path(source.name) if source.home is None else source.name
+        attributes = {name: getattr(part, name) for name in names.split()}
+        return attributes | more | {'file': file, 'line': span.line}
+
     return {
         'version': _VERSION,
         'name': picture.name,
         'description': picture.description,
-        'nodes': [_node(picture, node) for node in picture.nodes],
-        'channels': [_channel(picture, channel) for channel in picture.channels],
-        'edges': [_edge(picture, edge) for edge in picture.edges],
+        'nodes': [
+            describe(
+                node,
+                'id kind name namespace description findings',
+                host=node.place[0],
+                worker=node.place[1],
+            )
+            for node in picture.nodes
+        ],
+        'channels': [
+            describe(channel, 'id kind name types external findings')
+            for channel in picture.channels
+        ],
+        'edges': [
+            describe(
+                edge,
+                'id role name node channel type qos by_parameter findings',
+                **dict(zip(('from', 'to'), edge.ends, strict=True)),
+                delivery=edge.delivery.way,
+                delivery_reason=edge.delivery.reason,
+            )
+            for edge in picture.edges
+        ],
         'waits': [
-            {'node': wait.waiter, 'for': wait.target, **_place_of(picture, wait.path)}
-            for wait in picture.waits
+            describe(wait, node=wait.waiter, **{'for': wait.target}) for wait in picture.waits
         ],
         'findings': [describe_finding(finding) for finding in picture.findings],
-    }
-
-
-def _node(picture: Picture, node: NodeBox) -> dict[str, Any]:
-    return {
-        'id': node.id,
-        'kind': node.kind,
-        'name': node.name,
-        'namespace': node.namespace,
-        'description': node.description,
-        'host': node.place[0],
-        'worker': node.place[1],
-        'findings': list(node.findings),
-        **_place_of(picture, node.path),
-    }
-
-
-def _channel(picture: Picture, channel: ChannelBox) -> dict[str, Any]:
-    return {
-        'id': channel.id,
-        'kind': channel.kind,
-        'name': channel.name,
-        'types': list(channel.types),
-        'external': list(channel.external),
-        'findings': list(channel.findings),
-        **_place_of(picture, channel.path),
-    }
-
-
-def _edge(picture: Picture, edge: Edge) -> dict[str, Any]:
-    start, end = edge.ends
-    return {
-        'id': edge.id,
-        'role': edge.role,
-        'name': edge.name,
-        'node': edge.node,
-        'channel': edge.channel,
-        'from': start,
-        'to': end,
-        'type': edge.type,
-        'qos': dict(edge.qos),
-        'delivery': edge.delivery.way,
-        'delivery_reason': edge.delivery.reason,
-        'by_parameter': dict(edge.by_parameter),
-        'findings': list(edge.findings),
-        **_place_of(picture, edge.path),
     }
 
 
@@ -130,14 +111,3 @@ def describe_finding(finding: Diagnostic) -> dict[str, Any]:
         'line': span.line if span else None,
         'column': span.column if span else None,
     }
-
-
-def _place_of(picture: Picture, path: DataPath) -> dict[str, Any]:
-    return _place(picture.positions.key(path))
-
-
-def _place(span: Span) -> dict[str, Any]:
-    # A value of --set is in no file.
-    is_file = span.source.home is None
-    name = relative_path(span.source.name) if is_file else span.source.name
-    return {'file': name, 'line': span.line}

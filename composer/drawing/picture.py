@@ -5,11 +5,18 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from composer.checks.placement.crossings import place_of
+from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
 from composer.drawing.delivery import deliveries_of
 from composer.drawing.finding_places import FindingPlaces
-from composer.drawing.qos_labels import differing_policies
+from composer.language.qos import (
+    BUILTIN_PROFILES,
+    DEFAULT_PROFILE,
+    INFINITE,
+    QosError,
+    format_policy_value,
+    resolve_qos,
+)
 from composer.language.specs import ComponentSpec
 from composer.names import expand_name, expand_namespace, join_names
 from composer.records import record
@@ -23,57 +30,54 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec
+    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, QosSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
 NodeKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']
 
+# Policies whose values are clear without their names.
+_SELF_EXPLANATORY = ('reliability', 'durability', 'history')
+
 
 @record
-class NodeBox:
-    """A node or a process.
+class Box:
+    """A node or process, or a topic, service or action.
 
     Attributes:
         id: Its kind and full name, as in `node:/robot/arm`; no two are the same.
-        namespace: In full, as in `/robot`.
+        name: That of a topic, service or action is full.
+        namespace: In full, as in `/robot`; of a channel, the deepest one that has all its ends.
+        place: The host and the worker that it, or all its ends, run in; empty for those that the
+            file names not.
+        path: Of a channel, that of the end that is declared first.
         findings: Its findings, as indices into those of the picture.
-        place: The host and the worker that it runs in; empty for those that the file names not.
-    """
-
-    id: str
-    kind: NodeKind
-    name: str
-    namespace: str
-    description: str
-    path: DataPath
-    findings: tuple[int, ...]
-    place: Place
-
-
-@record
-class ChannelBox:
-    """A topic, service or action.
-
-    Attributes:
-        id: Its kind and full name, as in `topic:/robot/scan`.
-        types: The types that its ends declare; more than one is an error.
-        namespace: The deepest one that has all its ends.
+        types: The types that the ends of a channel declare; more than one is an error.
         external: The sides on which an end is outside the system, by `external: true`.
-        path: The path of the end that is declared first.
-        findings: Its findings, as indices into those of the picture.
-        place: The host and the worker that have all its ends; empty if none has.
     """
 
     id: str
-    kind: ChannelKind
+    kind: NodeKind | ChannelKind
     name: str
-    types: tuple[str, ...]
     namespace: str
-    external: tuple[Side, ...]
+    place: Place
     path: DataPath
     findings: tuple[int, ...]
-    place: Place
+    description: str = ''
+    types: tuple[str, ...] = ()
+    external: tuple[Side, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Its kind and full name."""
+        is_node = self.kind == 'node'
+        return f'{self.kind} {join_names(self.namespace, self.name) if is_node else self.name}'
+
+    @property
+    def facts(self) -> list[str]:
+        """What there is to say of it."""
+        place = '' if self.types else describe_place(self.place)
+        return [*filter(None, (self.description, place)), *self.types]
 
 
 @record
@@ -109,9 +113,20 @@ class Edge:
         return (self.node, self.channel) if self.begins_at_node else (self.channel, self.node)
 
     @property
+    def policies(self) -> str:
+        """The QoS in words, as in `best_effort, depth 5, deadline 0.1 s`."""
+        return ', '.join(_describe_policy(key, value) for key, value in self.qos.items())
+
+    @property
     def followed(self) -> str:
         """What follows parameters, in words; empty for nothing."""
         return ', '.join(f'{key} by parameter {name}' for key, name in self.by_parameter.items())
+
+
+def _describe_policy(key: str, value: Any) -> str:
+    if key in _SELF_EXPLANATORY and value not in ('system_default', 'best_available'):
+        return str(value)
+    return f'{key.replace("_", " ")} {format_policy_value(key, value)}'
 
 
 @record
@@ -134,17 +149,30 @@ class Picture:
 
     name: str
     description: str
-    nodes: tuple[NodeBox, ...]
-    channels: tuple[ChannelBox, ...]
+    nodes: tuple[Box, ...]
+    channels: tuple[Box, ...]
     edges: tuple[Edge, ...]
     waits: tuple[Wait, ...]
     findings: tuple[Diagnostic, ...]
     positions: SourceMap
 
     @property
-    def parts(self) -> tuple[NodeBox | ChannelBox | Edge, ...]:
+    def parts(self) -> tuple[Box | Edge, ...]:
         """All that may have findings."""
         return (*self.nodes, *self.channels, *self.edges)
+
+    def tokens(self) -> dict[str, str]:
+        """Return short names of the parts by their ids: no keyword of a language is like them."""
+        kinds: tuple[tuple[str, Sequence[Box | Edge]], ...] = (
+            ('n', self.nodes),
+            ('c', self.channels),
+            ('e', self.edges),
+        )
+        return {
+            part.id: f'{letter}{index}'
+            for letter, parts in kinds
+            for index, part in enumerate(parts)
+        }
 
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
@@ -160,49 +188,39 @@ def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Pict
         nodes,
         channels,
         tuple(_edges(context, topology, places, ids)),
-        tuple(_waits(context, nodes, channels, ids)),
+        tuple(_waits(context, {*ids.values(), *(channel.id for channel in channels)}, ids)),
         tuple(findings),
         context.system.positions,
     )
-    return _concealed(picture, _Names()) if hidden_values() else picture
+    return _concealed(picture, {}) if hidden_values() else picture
 
 
-class _Names:
-    """What is shown for names and ids: those that differ still do."""
+def _concealed(value: Any, shown: dict[str, str]) -> Any:
+    """Return a part of a picture with the origins of hidden values in their place.
 
-    def __init__(self) -> None:
-        self._shown: dict[str, str] = {}
-        self._taken: set[str] = set()
-
-    def show(self, text: str) -> str:
-        if text not in self._shown:
-            shown = concealed = conceal(text)
-            number = 1
-            while shown != text and shown in self._taken:
-                number += 1
-                shown = f'{concealed} {number}'
-            self._shown[text] = shown
-            self._taken.add(shown)
-        return self._shown[text]
-
-
-def _concealed(value: Any, names: _Names) -> Any:
-    """Return a part of a picture with the origins of hidden values in their place."""
+    Args:
+        shown: What is shown for each text so far: for those that differ, it does, too.
+    """
     if isinstance(value, str):
-        return names.show(value)
+        if value not in shown:
+            text = concealed = conceal(value)
+            number = 1
+            while text != value and text in shown.values():
+                number += 1
+                text = f'{concealed} {number}'
+            shown[value] = text
+        return shown[value]
     if isinstance(value, tuple):
-        return tuple(_concealed(each, names) for each in value)
-    if isinstance(value, Picture | NodeBox | ChannelBox | Edge | Wait):
-        inner = {each.name: getattr(value, each.name) for each in fields(value)}
+        return tuple(_concealed(each, shown) for each in value)
+    if isinstance(value, Picture | Box | Edge | Wait):
         # By its path a part is found in the file.
         known = {'path', 'findings', 'kind', 'external', 'place', 'positions'}
-        return replace(
-            value, **{k: _concealed(v, names) for k, v in inner.items() if k not in known}
-        )
+        names = (each.name for each in fields(value) if each.name not in known)
+        return replace(value, **{name: _concealed(getattr(value, name), shown) for name in names})
     return value
 
 
-def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:
+def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
     taken: set[str] = set()
     for kind, node in _specs(context):
         namespace = expand_namespace(node.namespace or '')
@@ -212,22 +230,13 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[NodeBox]:
         while id_ in taken:
             id_ += "'"
         taken.add(id_)
-        yield NodeBox(
-            id_,
-            kind,
-            node.name,
-            namespace,
-            node.description,
-            node.path,
-            places.of_node(node.path),
-            _place_of(context, node),
+        place = (
+            (context.spec.processes[node.container].host, '')
+            if isinstance(node, ComponentSpec)
+            else (node.host, getattr(node, 'worker', ''))
         )
-
-
-def _place_of(context: CheckContext, node: NodeSpec | ProcessSpec | ComponentSpec) -> Place:
-    if isinstance(node, ComponentSpec):
-        return context.spec.processes[node.container].host, ''
-    return node.host, getattr(node, 'worker', '')
+        found = places.of(node.path)
+        yield Box(id_, kind, node.name, namespace, place, node.path, found, node.description)
 
 
 def _specs(
@@ -241,7 +250,7 @@ def _specs(
         yield 'node', component
 
 
-def _channels(topology: Topology, places: FindingPlaces) -> Iterator[ChannelBox]:
+def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
     for channel in topology.channels.values():
         ends = channel.ends
         sides: list[Side] = []
@@ -249,16 +258,16 @@ def _channels(topology: Topology, places: FindingPlaces) -> Iterator[ChannelBox]
             sides.append('providers')
         if any(getattr(end.entity, 'external', False) for end in channel.providers):
             sides.append('users')
-        yield ChannelBox(
+        yield Box(
             f'{channel.kind}:{channel.name}',
             channel.kind,
             channel.name,
-            tuple(dict.fromkeys(end.entity.type for end in ends)),
             _common_namespace([end.node.namespace for end in ends]),
-            tuple(sides),
-            ends[0].path,
-            places.of_channel((channel.kind, channel.name)),
             _common_place([place_of(end) for end in ends]),
+            ends[0].path,
+            places.of((channel.kind, channel.name)),
+            types=tuple(dict.fromkeys(end.entity.type for end in ends)),
+            external=tuple(sides),
         )
 
 
@@ -270,12 +279,11 @@ def _common_place(places: Sequence[Place]) -> Place:
 
 
 def _common_namespace(namespaces: Sequence[str]) -> str:
-    first, *others = [[part for part in each.split('/') if part] for each in namespaces]
     common: list[str] = []
-    for place, part in enumerate(first):
-        if any(each[place : place + 1] != [part] for each in others):
+    for parts in zip(*(each.strip('/').split('/') for each in namespaces), strict=False):
+        if len({*parts}) > 1:
             break
-        common.append(part)
+        common.append(parts[0])
     return '/' + '/'.join(common)
 
 
@@ -290,6 +298,7 @@ def _edges(
             node = ids[boxed]
             inner = '' if boxed == end.node.path else str(end.node.path[-1])
             owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
+            followed = getattr(end.entity, 'by_parameter', {})
             yield Edge(
                 f'{end.kind.noun}:{owner}:{end.entity.name}',
                 _role(end),
@@ -298,18 +307,28 @@ def _edges(
                 node,
                 f'{channel.kind}:{channel.name}',
                 end.entity.type,
-                differing_policies(end.qos, context.spec.qos),
+                _differing_policies(end.qos, context.spec.qos),
                 deliveries[end.path],
                 end.path,
-                places.of_edge(end.path),
-                {
-                    key: each.parameter
-                    for key, each in getattr(end.entity, 'by_parameter', {}).items()
-                },
+                places.of(end.path),
+                {key: value.parameter for key, value in followed.items()},
             )
 
 
-def sends(channel: ChannelKind, *, provides: bool) -> bool:
+def _differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
+    """Return the policies that differ from the profile `default`; none if the QoS is invalid.
+
+    Topics and services have the same defaults (`rmw/qos_profiles.h`).
+    """
+    try:
+        policies = resolve_qos(spec, profiles) if spec else {}
+    except QosError:
+        return {}
+    usual = BUILTIN_PROFILES[DEFAULT_PROFILE]
+    return {key: value for key, value in policies.items() if value != usual.get(key, INFINITE)}
+
+
+def sends(channel: str, *, provides: bool) -> bool:
     """Return whether an end sends: publishers send messages, and clients requests and goals."""
     return provides == (channel == 'topic')
 
@@ -318,17 +337,10 @@ def _role(end: Endpoint) -> str:
     return f'{end.kind.noun} server' if end.kind.noun == end.kind.channel else end.kind.noun
 
 
-def _waits(
-    context: CheckContext,
-    nodes: Sequence[NodeBox],
-    channels: Sequence[ChannelBox],
-    ids: Mapping[DataPath, str],
-) -> Iterator[Wait]:
-    known = {node.id for node in nodes} | {channel.id for channel in channels}
+def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) -> Iterator[Wait]:
     for _, waiter in _specs(context):
         for condition in waiter.wait_for:
-            target = _target(waiter, condition)
-            if target in known:
+            if (target := _target(waiter, condition)) in known:
                 yield Wait(ids[waiter.path], target, condition.path)
     for component in context.spec.components:
         # It is drawn at its container.

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING
 
 from composer.drawing.delivery import OUTSIDE
 from composer.drawing.picture import sends
-from composer.drawing.qos_labels import describe_policies
+from composer.names import count_of
 from composer.records import record
-from composer.rules import Severity
 from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from composer.checks.placement.crossings import Place
-    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
+    from composer.drawing.picture import Edge, Picture
 
 _REMARK_WIDTH = 44
 # Of a part with more findings, the rest is counted.
@@ -36,6 +35,7 @@ class Shape:
         id: The id of what it shows; of the channel, if it stands for external ends.
         kind: `node`, `process`, `topic`, `service`, `action` or `external`; of a folded region,
             `folded`.
+        title: Empty for a line.
         details: Smaller lines below the title.
         remarks: The messages of its findings, in lines.
         mark: The worst of its findings, `error` or `warning`; empty if it has none.
@@ -44,32 +44,21 @@ class Shape:
     token: str
     id: str
     kind: str
-    title: str
+    title: str = ''
     details: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     mark: str = ''
 
 
 @record
-class Line:
-    """An arrow between two shapes.
+class Line(Shape):
+    """An arrow between two shapes, with its details beside it.
 
-    Attributes:
-        id: The id of what it shows; empty for waits and external ends.
-        kind: `topic`, `service`, `action`, `external` or `wait`.
-        details: The text beside it.
-        remarks: The messages of its findings, in lines.
-        mark: As for a shape.
+    Its `id` is empty for waits and external ends, and its `kind` may be `wait`.
     """
 
-    token: str
-    id: str
-    kind: str
-    start: str
-    end: str
-    details: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    mark: str = ''
+    start: str = ''
+    end: str = ''
 
 
 @record
@@ -150,24 +139,64 @@ def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangemen
         folded: The ids of regions that are drawn as one shape.
     """
     root = Region('/')
-    remarks = _Remarks(picture)
-    tokens = tokens_of(picture)
-    for node in picture.nodes:
-        region = root.at(node.place).within(node.namespace)
-        region.shapes.append(_node_shape(tokens[node.id], node, remarks))
+    tokens, marks = picture.tokens(), _marks(picture)
+    for box in (*picture.nodes, *picture.channels):
+        details = tuple(map(escape, box.types))
+        shape = Shape(tokens[box.id], box.id, box.kind, escape(box.name), details, *marks[box.id])
+        root.at(box.place).within(box.namespace).shapes.append(shape)
+    lines = [_line(edge, tokens, *marks[edge.id]) for edge in picture.edges]
     for channel in picture.channels:
-        region = root.at(channel.place).within(channel.namespace)
-        region.shapes.append(_channel_shape(tokens[channel.id], channel, remarks))
-    lines = [_edge_line(edge, tokens, remarks) for edge in picture.edges]
-    for shape, line in _external_ends(picture.channels, tokens):
-        root.shapes.append(shape)
-        lines.append(line)
+        for side in channel.external:
+            token = f'x{tokens[channel.id]}{side[0]}'
+            root.shapes.append(Shape(token, channel.id, 'external', 'external'))
+            ends = [token, tokens[channel.id]]
+            if not sends(channel.kind, provides=side == 'providers'):
+                ends.reverse()
+            lines.append(Line(f'{token}l', '', 'external', start=ends[0], end=ends[1]))
     for index, wait in enumerate(picture.waits):
-        ends = tokens[wait.target], tokens[wait.waiter]
-        lines.append(Line(f'w{index}', '', 'wait', *ends, details=('before',)))
+        start, end = tokens[wait.target], tokens[wait.waiter]
+        lines.append(Line(f'w{index}', '', 'wait', details=('before',), start=start, end=end))
     regions = {f'g{index}': region for index, region in enumerate(root.walk())}
     drawn = Arrangement(root, tuple(lines), regions)
     return _fold(drawn, {edge.id: edge.role for edge in picture.edges}, folded)
+
+
+def _line(edge: Edge, tokens: dict[str, str], remarks: tuple[str, ...], mark: str) -> Line:
+    start, end = edge.ends
+    # External ends are drawn.
+    delivery = '' if edge.delivery.reason == OUTSIDE else str(edge.delivery)
+    return Line(
+        tokens[edge.id],
+        edge.id,
+        edge.channel.partition(':')[0],
+        details=tuple(map(escape, filter(None, (edge.policies, delivery, edge.followed)))),
+        remarks=remarks,
+        mark=mark,
+        start=tokens[start],
+        end=tokens[end],
+    )
+
+
+def _marks(picture: Picture) -> dict[str, tuple[tuple[str, ...], str]]:
+    """Return the remarks and the mark of each part: a message is shown once, else only marked."""
+    told: set[int] = set()
+    marks = {}
+    for part in picture.parts:
+        fresh = [picture.findings[index] for index in part.findings if index not in told]
+        told.update(part.findings)
+        remarks = [
+            line
+            for finding in fresh[:_MOST_REMARKS]
+            for line in textwrap.wrap(
+                f'{finding.severity.value}: {escape(finding.message)}', _REMARK_WIDTH
+            )
+        ]
+        if (rest := len(fresh) - _MOST_REMARKS) > 0:
+            remarks.append(f'and {rest} more')
+        severities = (picture.findings[index].severity.value for index in part.findings)
+        # `error` is before `warning`.
+        marks[part.id] = tuple(remarks), min(severities, default='')
+    return marks
 
 
 def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) -> Arrangement:
@@ -205,7 +234,7 @@ def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) ->
                 line,
                 token=f'm{index}',
                 id='',
-                details=_count(bundle, roles) or line.details,
+                details=count_kinds(roles[each.id] for each in bundle if each.id) or line.details,
                 remarks=(),
                 mark=_worst(bundle),
             )
@@ -215,117 +244,14 @@ def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) ->
 
 
 def _folded_shape(token: str, region: Region, hidden: Sequence[Shape]) -> Shape:
-    counts = Counter(shape.kind for shape in hidden if shape.kind != 'external')
-    details = tuple(counted(number, kind) for kind, number in counts.items())
+    details = count_kinds(shape.kind for shape in hidden if shape.kind != 'external')
     return Shape(token, region.id, 'folded', region.title, details, mark=_worst(hidden))
 
 
-def _worst(parts: Sequence[Shape] | Sequence[Line]) -> str:
-    # `error` is before `warning`.
+def _worst(parts: Sequence[Shape]) -> str:
     return min((part.mark for part in parts if part.mark), default='')
 
 
-def _count(bundle: Sequence[Line], roles: dict[str, str]) -> tuple[str, ...]:
-    counts = Counter(roles[line.id] for line in bundle if line.id)
-    return tuple(counted(number, role) for role, number in counts.items())
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number and a noun, as in `2 processes`."""
-    many = 'processes' if noun == 'process' else f'{noun}s'
-    return f'{number} {noun if number == 1 else many}'
-
-
-def tokens_of(picture: Picture) -> dict[str, str]:
-    """Return the tokens of nodes, processes, channels and their ends, by their ids."""
-    return {
-        **{node.id: f'n{index}' for index, node in enumerate(picture.nodes)},
-        **{channel.id: f'c{index}' for index, channel in enumerate(picture.channels)},
-        **{edge.id: f'e{index}' for index, edge in enumerate(picture.edges)},
-    }
-
-
-def worst_mark(picture: Picture, findings: Iterable[int]) -> str:
-    """Return `error`, `warning`, or an empty text if there are no findings."""
-    severities = {picture.findings[index].severity for index in findings}
-    if Severity.ERROR in severities:
-        return Severity.ERROR.value
-    return Severity.WARNING.value if severities else ''
-
-
-class _Remarks:
-    """The messages of findings: each is shown once, and its other places are only marked."""
-
-    def __init__(self, picture: Picture) -> None:
-        self._picture = picture
-        self._shown: set[int] = set()
-
-    def take(self, findings: Sequence[int]) -> tuple[str, ...]:
-        """Return the lines of those findings that are not shown yet."""
-        fresh = [index for index in findings if index not in self._shown]
-        self._shown.update(fresh)
-        lines = [line for index in fresh[:_MOST_REMARKS] for line in self._lines(index)]
-        rest = len(fresh) - _MOST_REMARKS
-        return (*lines, f'and {rest} more') if rest > 0 else tuple(lines)
-
-    def mark(self, findings: Sequence[int]) -> str:
-        """Return the worst severity; see `worst_mark`."""
-        return worst_mark(self._picture, findings)
-
-    def _lines(self, index: int) -> Iterator[str]:
-        finding = self._picture.findings[index]
-        text = f'{finding.severity.value}: {escape(finding.message)}'
-        yield from textwrap.wrap(text, _REMARK_WIDTH)
-
-
-def _node_shape(token: str, node: NodeBox, remarks: _Remarks) -> Shape:
-    return Shape(
-        token,
-        node.id,
-        node.kind,
-        escape(node.name),
-        remarks=remarks.take(node.findings),
-        mark=remarks.mark(node.findings),
-    )
-
-
-def _channel_shape(token: str, channel: ChannelBox, remarks: _Remarks) -> Shape:
-    return Shape(
-        token,
-        channel.id,
-        channel.kind,
-        escape(channel.name),
-        tuple(map(escape, channel.types)),
-        remarks.take(channel.findings),
-        remarks.mark(channel.findings),
-    )
-
-
-def _edge_line(edge: Edge, tokens: dict[str, str], remarks: _Remarks) -> Line:
-    start, end = edge.ends
-    # External ends are drawn.
-    delivery = '' if edge.delivery.reason == OUTSIDE else str(edge.delivery)
-    details = filter(None, (describe_policies(edge.qos), delivery, edge.followed))
-    return Line(
-        tokens[edge.id],
-        edge.id,
-        edge.channel.partition(':')[0],
-        tokens[start],
-        tokens[end],
-        tuple(map(escape, details)),
-        remarks.take(edge.findings),
-        remarks.mark(edge.findings),
-    )
-
-
-def _external_ends(
-    channels: Iterable[ChannelBox], tokens: dict[str, str]
-) -> Iterator[tuple[Shape, Line]]:
-    for channel in channels:
-        for side in channel.external:
-            token = f'x{tokens[channel.id]}{side[0]}'
-            ends = (token, tokens[channel.id])
-            if not sends(channel.kind, provides=side == 'providers'):
-                ends = ends[::-1]
-            shape = Shape(token, channel.id, 'external', 'external')
-            yield shape, Line(f'{token}l', '', 'external', *ends)
+def count_kinds(kinds: Iterable[str]) -> tuple[str, ...]:
+    """Return how many there are of each kind, as in `2 processes`."""
+    return tuple(count_of(number, kind) for kind, number in Counter(kinds).items())

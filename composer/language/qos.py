@@ -69,6 +69,13 @@ BEST_OF_SERVICES = BEST_OF_PUBLISHERS | {'durability': 'volatile'}
 
 # Nobody writes longer ones; thousands of profiles in a chain would take quadratic time.
 _LONGEST_CHAIN = 50
+# The values of policies with which messages may be handed over; any other is the middleware's.
+_KEPT_LOCALLY = {
+    'durability': ('volatile',),
+    'history': ('keep_last', 'keep_all'),
+    'reliability': ('reliable', 'best_effort'),
+    'liveliness': ('automatic', 'system_default'),
+}
 
 
 class QosError(ComposerError):
@@ -125,3 +132,13 @@ def format_policy_value(policy: str, value: Any) -> str:
     if policy in DURATIONS and not isinstance(value, str):
         return f'{value:g} s'
     return str(value)
+
+
+def why_sent(policies: Mapping[str, Any]) -> str:
+    """Return which policy only the middleware keeps; empty if messages may be handed over."""
+    for name, values in _KEPT_LOCALLY.items():
+        if policies[name] not in values:
+            return f'{name}: {policies[name]}'
+    # 0 is no limit, and neither is a word.
+    limits = (name for name in ('deadline', 'lifespan') if policies.get(name))
+    return next((name for name in limits if not isinstance(policies[name], str)), '')

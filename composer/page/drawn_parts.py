@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from composer.checks.placement.crossings import describe_place
 from composer.diagnostics import relative_path
 from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.json_document import describe_finding
-from composer.drawing.qos_labels import describe_policies
-from composer.drawing.shapes import arrange_shapes, counted, tokens_of
+from composer.drawing.shapes import arrange_shapes, count_kinds
 from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.bindings import node_bindings
-from composer.names import join_names
 from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.drawing.excerpts import Excerpt
-    from composer.drawing.picture import ChannelBox, Edge, NodeBox, Picture
+    from composer.drawing.picture import Edge, Picture
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
 
@@ -126,24 +123,33 @@ def _describe(picture: Picture, drawn: Arrangement) -> dict[str, Any]:
 
 def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the data of each node, channel and edge, by its token."""
-    tokens = tokens_of(picture)
-    excerpts = Excerpts(picture.positions)
-    ends = _ends(picture)
-    names = {node.id: node.name for node in picture.nodes}
-    for node in picture.nodes:
-        near = [tokens[edge.id] for edge in ends[node.id]]
-        yield tokens[node.id], _part(_describe_node(node), node, near, excerpts.of(node.path))
-    for channel in picture.channels:
-        near = [tokens[edge.id] for edge in ends[channel.id]]
-        shown = [each for edge in ends[channel.id][:_MOST_ENDS] for each in excerpts.of(edge.path)]
-        yield (
-            tokens[channel.id],
-            _part(_describe_channel(channel), channel, near, list(dict.fromkeys(shown))),
-        )
+    tokens, excerpts = picture.tokens(), Excerpts(picture.positions)
+    ends: dict[str, list[Edge]] = defaultdict(list)
     for edge in picture.edges:
-        near = [tokens[edge.node], tokens[edge.channel]]
-        words = _describe_edge(edge, names[edge.node])
-        yield tokens[edge.id], _part(words, edge, near, excerpts.of(edge.path))
+        ends[edge.node].append(edge)
+        ends[edge.channel].append(edge)
+    for box in (*picture.nodes, *picture.channels):
+        # Of a channel, the lines of its ends.
+        declared = ends[box.id][:_MOST_ENDS] if box.types else [box]
+        near = [tokens[edge.id] for edge in ends[box.id]]
+        name, facts = box.title.partition(' ')[2], box.facts
+        for side in box.external:
+            provides = side == 'providers'
+            kinds = (kind for kind in CHANNEL_KINDS if kind.channel == box.kind)
+            facts += [f'external {kind.noun}s' for kind in kinds if kind.provides == provides]
+        lines = dict.fromkeys(lines for part in declared for lines in excerpts.of(part.path))
+        yield tokens[box.id], _part(box.id, box.kind, name, facts, box.findings, near, lines)
+    names = {node.id: node.name for node in picture.nodes}
+    for edge in picture.edges:
+        qos = edge.policies and f'QoS: {edge.policies}'
+        delivery = edge.delivery.way and f'delivery: {edge.delivery}'
+        facts = [*filter(None, (edge.type, qos, delivery, edge.followed))]
+        name, near = (
+            f'{edge.name} of {names[edge.node]}',
+            [tokens[each] for each in (edge.node, edge.channel)],
+        )
+        part = _part(edge.id, edge.role, name, facts, edge.findings, near, excerpts.of(edge.path))
+        yield tokens[edge.id], {**part, 'leaves_node': edge.begins_at_node}
 
 
 def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[str, Any]:
@@ -154,17 +160,13 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
         for token, part in parts.items()
         if token[0] == 'e' and len(members.keys() & set(part['near'])) == 1
     ]
-    counts = Counter(members.values())
+    name = region.title.removeprefix(f'{region.kind} ')
     return {
-        'id': region.id,
-        'kind': region.kind,
-        'name': region.title.removeprefix(f'{region.kind} '),
-        'facts': [', '.join(counted(number, kind) for kind, number in counts.items())],
+        **_part(
+            region.id, region.kind, name, [', '.join(count_kinds(members.values()))], (), near
+        ),
         'folded': region.id in {shape.id for shape in drawn.root.all_shapes()},
         'members': list(members),
-        'findings': (),
-        'near': near,
-        'excerpts': [],
     }
 
 
@@ -175,64 +177,27 @@ def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str
         near = [token for token in near if token in parts]
         if near:
             start, end = (parts[token] for token in (line.start, line.end))
-            yield (
-                line.token,
-                {
-                    'id': f'lines:{start["id"]}>{end["id"]}',
-                    'kind': 'connections',
-                    'name': f'{start["name"]} to {end["name"]}',
-                    'facts': line.details,
-                    'findings': (),
-                    'near': near,
-                    'excerpts': [],
-                },
-            )
-
-
-def _ends(picture: Picture) -> dict[str, list[Edge]]:
-    """Return the edges of each node and channel, by its id."""
-    ends: dict[str, list[Edge]] = defaultdict(list)
-    for edge in picture.edges:
-        ends[edge.node].append(edge)
-        ends[edge.channel].append(edge)
-    return ends
+            id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'
+            yield line.token, _part(id_, 'connections', name, line.details, (), near)
 
 
 def _part(
-    words: dict[str, Any],
-    part: NodeBox | ChannelBox | Edge,
-    near: list[str],
-    excerpts: list[Excerpt],
+    id_: str,
+    kind: str,
+    name: str,
+    facts: Sequence[str],
+    findings: Sequence[int],
+    near: Sequence[str],
+    excerpts: Iterable[Excerpt] = (),
 ) -> dict[str, Any]:
-    shown = [{'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts]
-    return {'id': part.id, **words, 'findings': part.findings, 'near': near, 'excerpts': shown}
-
-
-def _describe_node(node: NodeBox) -> dict[str, Any]:
-    name = join_names(node.namespace, node.name) if node.kind == 'node' else node.name
     return {
-        'kind': node.kind,
+        'id': id_,
+        'kind': kind,
         'name': name,
-        'facts': [*filter(None, (node.description, describe_place(node.place)))],
-    }
-
-
-def _describe_channel(channel: ChannelBox) -> dict[str, Any]:
-    facts = [*channel.types]
-    for side in channel.external:
-        provides = side == 'providers'
-        ends = (kind for kind in CHANNEL_KINDS if kind.channel == channel.kind)
-        facts += [f'external {end.noun}s' for end in ends if end.provides == provides]
-    return {'kind': channel.kind, 'name': channel.name, 'facts': facts}
-
-
-def _describe_edge(edge: Edge, owner: str) -> dict[str, Any]:
-    qos = [f'QoS: {describe_policies(edge.qos)}'] if edge.qos else []
-    delivery = [f'delivery: {edge.delivery}'] if edge.delivery.way else []
-    facts = [edge.type, *qos, *delivery, *filter(None, [edge.followed])]
-    return {
-        'kind': edge.role,
-        'name': f'{edge.name} of {owner}',
         'facts': facts,
-        'leaves_node': edge.begins_at_node,
+        'findings': findings,
+        'near': near,
+        'excerpts': [
+            {'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts
+        ],
     }

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from composer.application.running_systems.live_graph import LiveGraph
 from composer.errors import ComposerError
+from composer.interfaces.classes import interface_name
 from composer.interfaces.plain_messages import plain_message
+from composer.names import count_of
 from composer.runtime.control import protocol
-from composer.runtime.messages.payload_texts import read_parameter, read_payload
+from composer.runtime.messages.payload_texts import read_payload
+from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:
     from composer.application.running_systems.client import Client, RunningSystem
@@ -31,54 +34,46 @@ def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
     from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
     from rclpy.parameter import parameter_value_to_python
 
-    listed = _call(client, ListParameters, f'{node}/list_parameters', ListParameters.Request())
-    names = sorted(listed.result.names)[:_MOST]
-    request = DescribeParameters.Request(names=names)
-    described = _call(client, DescribeParameters, f'{node}/describe_parameters', request)
-    got = GetParameters.Request(names=names)
-    values = _call(client, GetParameters, f'{node}/get_parameters', got).values
+    def ask(service: str, service_class: Any, **asked: list[str]) -> Any:
+        return graph.call(f'{node}/{service}', service_class, service_class.Request(**asked))
+
+    graph = LiveGraph(client, _ANSWER_SEC)
+    names = sorted(ask('list_parameters', ListParameters).result.names)[:_MOST]
+    descriptors = ask('describe_parameters', DescribeParameters, names=names).descriptors
+    values = ask('get_parameters', GetParameters, names=names).values
     return [
         {
-            'name': each.name,
+            'name': descriptor.name,
             **_describe_value(parameter_value_to_python(value)),
-            'description': each.description,
-            'read_only': each.read_only,
-            'range': _range(each),
+            'description': descriptor.description,
+            'read_only': descriptor.read_only,
+            'range': _range(descriptor),
         }
-        for each, value in zip(described.descriptors, values, strict=False)
+        for descriptor, value in zip(descriptors, values, strict=False)
     ]
 
 
 def look_at_message(client: Client, topic: str) -> dict[str, Any]:
-    """Return a message of a topic as `text`, in YAML, and its `type`.
+    """Return a message of a topic as `text`, in YAML.
 
     Raises:
         ComposerError: None came, or its type is not installed.
     """
-    from composer.recordings.definitions import import_message
-    from composer.recordings.graph_recorder import match_offers, read_offer
-    from composer.yaml_text.writer import render_yaml
-
-    type_name = _find_type(client, 'topic', topic)
-    found: list[Any] = []
-    ends = client.node.get_publishers_info_by_topic(topic)
-    profile = match_offers(read_offer(each.qos_profile) for each in ends)
-    message_class = import_message(type_name)
-    ros = client.node.create_subscription(message_class, topic, found.append, profile)
+    graph = LiveGraph(client, _ANSWER_SEC)
+    name, message_class = graph.find('topic', topic)
+    messages: list[Any] = []
+    ros = graph.subscribe(name, message_class, messages.append)
     try:
-        deadline = monotonic() + _ANSWER_SEC
-        while not found and monotonic() < deadline:
-            client.executor.spin_once(timeout_sec=0.05)
+        if not graph.wait_for(lambda: messages):
+            message = f'no message came within {_ANSWER_SEC:g} s'
+            raise ComposerError(message)
     finally:
         client.node.destroy_subscription(ros)
-    if not found:
-        message = f'no message came within {_ANSWER_SEC:g} s'
-        raise ComposerError(message)
-    return {'text': render_yaml(plain_message(found[0]))[:_LONGEST_TEXT], 'type': type_name}
+    return {'text': _render(messages[0])}
 
 
 def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
-    """Return the fields of a message or a request, with their defaults, as `text` in YAML.
+    """Return the `type` and the fields of a message or a request, as `text` in YAML.
 
     Args:
         kind: `topic` or `service`.
@@ -86,14 +81,10 @@ def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
     Raises:
         ComposerError: There is no such topic or service, or its type is not installed.
     """
-    from composer.interfaces.classes import import_interface
-    from composer.yaml_text.writer import render_yaml
-
-    type_name = _find_type(client, kind, name)
-    found: Any = import_interface(type_name)
-    message = found.Request() if kind == 'service' else found()
-    data = plain_message(message)
-    return {'text': render_yaml(data) if data else '', 'type': type_name}
+    _, interface = LiveGraph(client, _ANSWER_SEC).find(kind, name)
+    message = interface.Request() if kind == 'service' else interface()
+    text = render_yaml(plain_message(message)) if message.get_fields_and_field_types() else ''
+    return {'text': text, 'type': interface_name(interface)}
 
 
 def act(
@@ -118,73 +109,49 @@ def act(
         )
         if not outcome.succeeded:
             raise ComposerError(outcome.text)
-        return {'text': outcome.text or 'nothing has changed'}
-    if action in ('record', 'end_record'):
-        return {'text': recording.begin(client) if action == 'record' else recording.end()}
-    done = {'set': _set, 'call': _call_service, 'publish': _publish}.get(action)
-    if done is None:
+        told = outcome.text or 'nothing has changed'
+    elif action in ('record', 'end_record'):
+        told = recording.begin(client) if action == 'record' else recording.end()
+    elif action == 'set':
+        parameter = wish.get('parameter', '')
+        LiveGraph(client, _ANSWER_SEC).set_parameter(name, parameter, text)
+        told = f'{parameter} = {text}'
+    elif action == 'call':
+        graph = LiveGraph(client, _ANSWER_SEC)
+        service, service_class = graph.find('service', name)
+        request = read_payload(text, service_class.Request)
+        told = _render(graph.call(service, service_class, request))
+    elif action == 'publish':
+        told = _publish(LiveGraph(client, _ANSWER_SEC), name, text)
+    else:
         message = f"there is no action '{action}'"
         raise ComposerError(message)
-    return {'text': done(client, name, text, wish.get('parameter', ''))}
+    return {'text': told}
 
 
-def _set(client: Client, node: str, text: str, parameter: str) -> str:
-    from rcl_interfaces.srv import GetParameterTypes, SetParameters
-
-    asked = GetParameterTypes.Request(names=[parameter])
-    types = _call(client, GetParameterTypes, f'{node}/get_parameter_types', asked).types
-    request = SetParameters.Request(parameters=[read_parameter(parameter, text, types[0])])
-    (result,) = _call(client, SetParameters, f'{node}/set_parameters', request).results
-    if not result.successful:
-        message = f'{node} refuses {parameter} = {text}: {result.reason or "without a reason"}'
-        raise ComposerError(message)
-    return f'{parameter} = {text}'
-
-
-def _call_service(client: Client, service: str, text: str, _: str) -> str:
-    from composer.interfaces.classes import import_interface
-    from composer.yaml_text.writer import render_yaml
-
-    service_class: Any = import_interface(_find_type(client, 'service', service))
-    answer = _call(client, service_class, service, read_payload(text, service_class.Request))
-    return render_yaml(plain_message(answer))[:_LONGEST_TEXT]
-
-
-def _publish(client: Client, topic: str, text: str, _: str) -> str:
+def _publish(graph: LiveGraph, topic: str, text: str) -> str:
     from rclpy.duration import Duration
     from rclpy.qos import DurabilityPolicy, QoSProfile
 
-    from composer.recordings.definitions import import_message
-
-    message_class = import_message(_find_type(client, 'topic', topic))
+    name, message_class = graph.find('topic', topic)
     message = read_payload(text, message_class)
-    ends = client.node.get_subscriptions_info_by_topic(topic)
+    ends = graph.node.get_subscriptions_info_by_topic(name)
     kept, profile = DurabilityPolicy.TRANSIENT_LOCAL, QoSProfile(depth=1)
     if any(each.qos_profile.durability == kept for each in ends):
         profile.durability = kept
-    ros = client.node.create_publisher(message_class, topic, profile)
+    ros = graph.node.create_publisher(message_class, name, profile)
     try:
-        deadline = monotonic() + _ANSWER_SEC
-        while ros.get_subscription_count() < len(ends) and monotonic() < deadline:
-            client.executor.spin_once(timeout_sec=0.05)
+        graph.wait_for(lambda: ros.get_subscription_count() >= len(ends))
         ros.publish(message)
         # Else it would be gone before all have it; one that takes nothing holds nobody up.
         ros.wait_for_all_acked(Duration(seconds=_ANSWER_SEC))
     finally:
-        client.node.destroy_publisher(ros)
-    return f'published, to {len(ends)} subscriptions'
+        graph.node.destroy_publisher(ros)
+    return f'published, to {count_of(len(ends), "subscription")}'
 
 
-def _find_type(client: Client, kind: str, name: str) -> str:
-    node = client.node
-    listed = (
-        node.get_service_names_and_types if kind == 'service' else node.get_topic_names_and_types
-    )
-    types = dict(listed()).get(name, [])
-    if len(types) != 1:
-        message = f"'{name}' has several types" if types else f"the graph has no {kind} '{name}'"
-        raise ComposerError(message)
-    return str(types[0])
+def _render(message: Any) -> str:
+    return render_yaml(plain_message(message))[:_LONGEST_TEXT]
 
 
 def _range(descriptor: Any) -> list[float] | None:
@@ -205,22 +172,3 @@ def _plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     return [_plain(each) for each in (value if not isinstance(value, bytes) else list(value))]
-
-
-def _call(client: Client, service: Any, name: str, request: Any) -> Any:
-    ros = client.node.create_client(service, name)
-    try:
-        deadline = monotonic() + _ANSWER_SEC
-        while not ros.service_is_ready():
-            if monotonic() > deadline:
-                message = f'{name} does not answer'
-                raise ComposerError(message)
-            client.executor.spin_once(timeout_sec=0.05)
-        future = ros.call_async(request)
-        client.executor.spin_until_future_complete(future, _ANSWER_SEC)
-        if not future.done():
-            message = f'{name} does not answer'
-            raise ComposerError(message)
-        return future.result()
-    finally:
-        client.node.destroy_client(ros)

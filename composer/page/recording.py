@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import ExitStack
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +9,7 @@ from composer.errors import ComposerError
 
 if TYPE_CHECKING:
     from composer.application.running_systems.client import Client
+    from composer.recordings.system_recorder import SystemRecorder
 
 
 class Recording:
@@ -24,7 +22,7 @@ class Recording:
 
     def __init__(self) -> None:
         self.target = self.told = ''
-        self._end = ExitStack()
+        self._recorder: SystemRecorder | None = None
 
     def begin(self, client: Client) -> str:
         """Begin, and return what is written.
@@ -32,34 +30,20 @@ class Recording:
         Raises:
             ComposerError: One is under way, or the file cannot be written.
         """
-        from rclpy.node import Node
-
-        from composer.recordings.graph_recorder import GraphRecorder
-        from composer.recordings.recorder import Recorder
-        from composer.recordings.recording_place import find_place
-        from composer.recordings.topic_patterns import TopicPatterns
+        from composer.recordings.recording_place import new_folder
+        from composer.recordings.system_recorder import create_recorder
 
         if self.target:
             message = f"'{self.target}' is being recorded already"
             raise ComposerError(message)
-        target = Path.cwd() / f'rosbag2_{datetime.now():%Y_%m_%d-%H_%M_%S}'  # noqa: DTZ005 - as rosbag2
-        patterns = TopicPatterns(())
-        recorder = Recorder(find_place(target), self)
-        node = Node(
-            f'_composer_record_{os.getpid()}',
-            context=client.node.context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-        graph = GraphRecorder(node, recorder, patterns, self.warning)
-        with ExitStack() as end:
-            end.callback(lambda: recorder.finish(patterns.describe_unused(graph.topics)))
-            end.callback(node.destroy_node)
-            end.callback(graph.stop)
-            graph.start()
-            self._end = end.pop_all()
-        self.target = str(target)
+        target = Path.cwd() / new_folder()
+        recorder = create_recorder(target, (), self)
+        try:
+            recorder.start(client.node.context)
+        except Exception:
+            recorder.stop()
+            raise
+        self._recorder, self.target = recorder, str(target)
         return f"recording to '{target}'"
 
     def end(self) -> str:
@@ -68,11 +52,11 @@ class Recording:
         Raises:
             ComposerError: Nothing is recorded.
         """
-        if not self.target:
+        if self._recorder is None:
             message = 'nothing is recorded'
             raise ComposerError(message)
-        self._end.close()
-        self.target = ''
+        self._recorder.stop()
+        self._recorder, self.target = None, ''
         return self.told
 
     def info(self, message: str) -> None:

@@ -18,8 +18,8 @@ from composer.application.running_systems.discovery import Discovery
 from composer.application.running_systems.health import read_health
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
-from composer.drawing.graphviz import DrawingError
 from composer.drawing.picture import build_picture
+from composer.drawing.svg import DrawingError
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.page.drawn_parts import describe_drawing, list_code

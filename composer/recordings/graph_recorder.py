@@ -169,7 +169,8 @@ class GraphRecorder:
     def stop(self) -> None:
         """Record what has come, and end the subscriptions."""
         os.eventfd_write(self._ended, 1)
-        self._thread.join(_END_SEC)
+        if self._thread.ident is not None:
+            self._thread.join(_END_SEC)
         for listener in self._listeners.values():
             self._take_all(listener)
             listener.close()

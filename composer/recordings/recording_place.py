@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from composer.errors import ComposerError, UsageError
@@ -12,7 +14,6 @@ from composer.records import record
 
 if TYPE_CHECKING:
     from io import FileIO
-    from pathlib import Path
 
 SUFFIX: Final = '.mcap'
 
@@ -71,3 +72,8 @@ def find_place(target: Path) -> RecordingPlace:
     if target.suffix == SUFFIX:
         return RecordingPlace(target, target)
     return RecordingPlace(target, target / f'{target.name}_0{SUFFIX}')
+
+
+def new_folder() -> Path:
+    """Return a folder for a recording that has no name, as rosbag2 calls it."""
+    return Path(f'rosbag2_{datetime.now():%Y_%m_%d-%H_%M_%S}')  # noqa: DTZ005 - as rosbag2

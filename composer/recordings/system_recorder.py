@@ -1,8 +1,8 @@
-"""Records the topics of a running system.
+"""Records the topics of a running system, or of the ROS graph alone.
 
-Messages of its own publishers are recorded where they are published, whether they are handed over
-or sent; so recording changes neither. What others publish comes through subscriptions, which get
-the messages of own publishers, too, where these send; those are left out there.
+Messages of a system's own publishers are recorded where they are published, whether they are
+handed over or sent; so recording changes neither. What others publish comes through
+subscriptions, which get the messages of own publishers, too, where these send; those are left out.
 """
 
 from __future__ import annotations
@@ -14,19 +14,23 @@ from typing import TYPE_CHECKING, Any, Final
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from composer.recordings.graph_recorder import GraphRecorder, read_offer
+from composer.recordings.recorder import Recorder
+from composer.recordings.recording_place import find_place
 from composer.recordings.serialized_messages import identify_publisher
+from composer.recordings.topic_patterns import TopicPatterns
 from composer.runtime.messages.local_delivery import is_latched
 from composer.runtime.middleware.ros_graph import create_graph_node
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
 
     from rclpy.context import Context
     from rclpy.node import Node as RosNode
     from rclpy.subscription import Subscription as RosSubscription
 
     from composer.recordings.mcap_writer import Channel
-    from composer.recordings.recorder import Sink
+    from composer.recordings.recorder import Log, Sink
     from composer.recordings.topic_patterns import Patterns
     from composer.runtime.messages.local_delivery import (
         LocalPublisher,
@@ -37,11 +41,27 @@ if TYPE_CHECKING:
 _NODE_NAME: Final = '_composer_recorder'
 
 
-class SystemRecorder:
-    """Records a system from `start` to `stop`.
+def create_recorder(target: Path, topics: Sequence[str], log: Log) -> SystemRecorder:
+    """Return what writes a recording.
 
     Args:
-        recorder: Writes the file.
+        target: A file, or a folder as rosbag2 makes it.
+        topics: Patterns of the topics; all if there are none.
+        log: Gets what becomes of it.
+
+    Raises:
+        UsageError: The target exists, or its folder does not, or a pattern is empty.
+        ComposerError: The file cannot be written, or the library for recordings is not installed.
+    """
+    patterns = TopicPatterns(topics)
+    return SystemRecorder(Recorder(find_place(target), log), patterns, log.warning)
+
+
+class SystemRecorder:
+    """Records a system, or the ROS graph alone, from `start` to `stop`.
+
+    Args:
+        sink: Writes the file.
         patterns: Which topics.
         report: Gets what keeps a topic, or a message, from being recorded.
         node_name: Of the node that listens to others.
@@ -50,7 +70,7 @@ class SystemRecorder:
 
     def __init__(
         self,
-        recorder: Sink,
+        sink: Sink,
         patterns: Patterns,
         report: Callable[[str], object],
         node_name: str = _NODE_NAME,
@@ -58,7 +78,7 @@ class SystemRecorder:
         is_late: bool = False,
     ) -> None:
         self._node_name, self._is_late = node_name, is_late
-        self._recorder = recorder
+        self.sink = sink
         self._patterns = patterns
         self._report = report
         self._topics: LocalTopics | None = None
@@ -66,24 +86,27 @@ class SystemRecorder:
         self._graph: GraphRecorder | None = None
         self._has_ended = False
 
-    def start(self, context: Context, topics: LocalTopics) -> None:
+    def start(self, context: Context, topics: LocalTopics | None = None) -> None:
         """Begin; the system has no nodes yet.
 
         Args:
-            topics: Those of the system.
+            topics: Those of the system; `None` for the ROS graph alone.
         """
-        own = _OwnPublishers(topics, leaves_latched=self._is_late)
-        self._topics = topics
-        self._find = partial(self._find_tap, own)
-        topics.tap(self._find)
+        own: _OwnPublishers | None = None
+        if topics is not None:
+            own = _OwnPublishers(topics, leaves_latched=self._is_late)
+            self._topics = topics
+            self._find = partial(self._find_tap, own)
+            topics.tap(self._find)
         self._node = create_graph_node(context, self._node_name)
-        self._graph = GraphRecorder(self._node, self._recorder, self._patterns, self._report, own)
+        self._graph = GraphRecorder(self._node, self.sink, self._patterns, self._report, own)
         self._graph.start()
 
     def follow(self, topic: str) -> None:
         """Begin anew with a topic, of which the patterns may say something else now."""
-        if self._topics is not None and self._graph is not None:
+        if self._graph is not None:
             self._graph.forget(topic)
+        if self._topics is not None:
             self._topics.follow_taps()
 
     def stop(self) -> None:
@@ -98,7 +121,7 @@ class SystemRecorder:
         if self._node is not None:
             self._node.destroy_node()
         seen = self._graph.topics if self._graph else ()
-        self._recorder.finish(self._patterns.describe_unused(seen))
+        self.sink.finish(self._patterns.describe_unused(seen))
 
     def _find_tap(
         self, own: _OwnPublishers, publisher: LocalPublisher
@@ -109,8 +132,8 @@ class SystemRecorder:
             return None
         own.publishers.add(identify_publisher(ros))
         offers = [read_offer(ros.qos_profile)]
-        channel = self._recorder.open_channel(topic, ros.msg_type, offers)
-        return create_tap(self._recorder, channel, ros.msg_type, self._report)
+        channel = self.sink.open_channel(topic, ros.msg_type, offers)
+        return create_tap(self.sink, channel, ros.msg_type, self._report)
 
 
 def create_tap(

@@ -114,9 +114,8 @@ def test_arrows_say_the_way_but_to_the_outside(draw):
 @pytest.mark.ros
 def test_the_drawing_and_a_running_publisher_agree():
     pytest.importorskip('rclpy')
-    from composer.drawing import delivery
     from composer.language.parsing.entry_parser import parse_entity_qos
-    from composer.language.qos import resolve_qos
+    from composer.language.qos import resolve_qos, why_sent
     from composer.runtime.messages import delivery_policies
     from composer.runtime.messages.qos_profiles import create_qos_profile
 
@@ -133,7 +132,7 @@ def test_the_drawing_and_a_running_publisher_agree():
     for each in policies:
         spec = parse_entity_qos({'qos': each}, ())
         running = delivery_policies.why_sent(create_qos_profile(spec, {}))
-        assert delivery.why_sent(resolve_qos(spec, {})) == running, each
+        assert why_sent(resolve_qos(spec, {})) == running, each
 
 
 SPLIT = """

@@ -321,9 +321,9 @@ def test_two_nodes_of_one_name_are_two(draw):
 def test_external_ends_of_either_side(external_ends):
     channels = by_id(describe_picture(external_ends), 'channels')
     assert {key: each['external'] for key, each in channels.items()} == {
-        'topic:/x': ['users'],
-        'topic:/y': ['providers'],
-        'service:/add': ['providers'],
+        'topic:/x': ('users',),
+        'topic:/y': ('providers',),
+        'service:/add': ('providers',),
     }
 
 

@@ -171,7 +171,7 @@ def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
 
 
 def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):
-    from composer.drawing.graphviz import DrawingError
+    from composer.drawing.svg import DrawingError
 
     monkeypatch.setattr('shutil.which', lambda name: None)
     monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
@@ -181,7 +181,7 @@ def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):
 
 
 def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
-    from composer.drawing.graphviz import DrawingError, lay_out
+    from composer.drawing.svg import DrawingError, lay_out
 
     program = tmp_path / 'dot'
     program.write_text(

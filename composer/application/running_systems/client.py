@@ -8,7 +8,7 @@ import time
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
-from composer.errors import ComposerError, RosNotFoundError
+from composer.errors import ComposerError, RosNotFoundError, UsageError
 from composer.network.variables import PEERS, drop_unknown_peers
 from composer.processes.kernel import CLIENT_THREADS, check_threads
 from composer.records import record
@@ -52,6 +52,10 @@ class RunningSystem:
 class Client:
     """A node beside those of the systems, while it is entered.
 
+    Args:
+        name: The beginning of the node's name.
+        ros_arguments: Those of a command line, as `-r` and `/scan:=/raw`.
+
     Attributes:
         domain_id: The ROS domain that it is in.
         node: The node itself.
@@ -60,9 +64,11 @@ class Client:
     Raises:
         RosNotFoundError: There is no rclpy, or no std_srvs.
         StartError: ROS cannot start.
+        UsageError: The ROS arguments are wrong.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = '_composer_client', ros_arguments: Sequence[str] = ()) -> None:
+        self._name, self._ros_arguments = name, ros_arguments
         check_ros()
         check_threads(CLIENT_THREADS)
         if importlib.util.find_spec('std_srvs') is None:
@@ -74,7 +80,6 @@ class Client:
         with environment_set(self._variables):
             check_shell({})
         check_middleware(os.environ)
-        self._exit = ExitStack()
 
     def __enter__(self) -> Self:
         from rclpy.context import Context
@@ -82,25 +87,29 @@ class Client:
         from rclpy.node import Node
         from rclpy.parameter import Parameter
 
-        self._exit.enter_context(environment_set(self._variables))
-        context = Context()
-        # No log file: it logs nothing.
-        context.init([], initialize_logging=False)
-        self._context = context
-        self._exit.callback(context.try_shutdown)
-        self.domain_id: int = context.get_domain_id()
-        self.node = Node(
-            f'_composer_client_{os.getpid()}',
-            context=context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-            parameter_overrides=[Parameter('start_type_description_service', value=False)],
-        )
-        self._exit.callback(self.node.destroy_node)
-        self.executor = SingleThreadedExecutor(context=context)
-        self.executor.add_node(self.node)
-        self._exit.callback(self.executor.shutdown)
+        with ExitStack() as stack:
+            stack.enter_context(environment_set(self._variables))
+            context = self._context = Context()
+            try:
+                # No log file: it logs nothing.
+                context.init(['--ros-args', *self._ros_arguments], initialize_logging=False)
+            except Exception as error:
+                message = f'ROS 2 cannot start: {error}'
+                raise UsageError(message) from error
+            stack.callback(context.try_shutdown)
+            self.domain_id: int = context.get_domain_id()
+            self.node = Node(
+                f'{self._name}_{os.getpid()}',
+                context=context,
+                enable_rosout=False,
+                start_parameter_services=False,
+                parameter_overrides=[Parameter('start_type_description_service', value=False)],
+            )
+            stack.callback(self.node.destroy_node)
+            self.executor = SingleThreadedExecutor(context=context)
+            self.executor.add_node(self.node)
+            stack.callback(self.executor.shutdown)
+            self._exit = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:

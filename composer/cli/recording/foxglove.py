@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from composer.application.recording_options import create_bridge
 from composer.application.running_systems.client import Client
 from composer.application.running_systems.discovery import Discovery
-from composer.cli.recording.graph_node import graph_node
 from composer.errors import ExitCode
 from composer.signals import asked_to_stop
 
@@ -28,12 +27,10 @@ def serve(name: str | None, options: BridgeOptions) -> int:
         ComposerError: There is no such system, or the port cannot be served.
         UsageError: There are several systems.
     """
-    with Client() as client:
-        system = Discovery(client).find(name)
-    with asked_to_stop() as is_asked, graph_node('_composer_foxglove_client') as node:
-        bridge = create_bridge(options, system.name)
+    with asked_to_stop() as is_asked, Client() as client:
+        bridge = create_bridge(options, Discovery(client).find(name).name)
         try:
-            bridge.start(node.context)
+            bridge.start(client.node.context)
             while not is_asked():
                 time.sleep(_POLL_SEC)
         finally:

@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 import time
-from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.cli.recording.graph_node import Terminal, graph_node
+import click
+
+from composer.application.running_systems.client import Client
 from composer.errors import ExitCode
+from composer.recordings.recording_place import new_folder
 from composer.signals import asked_to_stop
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 _POLL_SEC = 0.1
+
+
+class Terminal:
+    """Tells the user what becomes of a recording."""
+
+    def info(self, message: str) -> None:
+        """Print it."""
+        click.echo(escape(message), err=True)
+
+    def warning(self, message: str) -> None:
+        """Print a warning."""
+        self.info(f'warning: {message}')
+
+    def error(self, message: str) -> None:
+        """Print an error."""
+        self.info(f'error: {message}')
 
 
 def record(output: Path | None, topics: Sequence[str]) -> int:
@@ -31,21 +50,17 @@ def record(output: Path | None, topics: Sequence[str]) -> int:
         UsageError: The file exists, or its folder does not, or a pattern is empty.
         ComposerError: The file cannot be written.
     """
-    target = output or Path(f'rosbag2_{datetime.now():%Y_%m_%d-%H_%M_%S}')  # noqa: DTZ005 - as rosbag2
-    with asked_to_stop() as is_asked, graph_node('_composer_record') as node:
-        # These import rclpy, which the node has found.
-        from composer.recordings.graph_recorder import GraphRecorder
-        from composer.recordings.recorder import Recorder
-        from composer.recordings.recording_place import find_place
-        from composer.recordings.topic_patterns import TopicPatterns
+    terminal, target = Terminal(), output or new_folder()
+    with asked_to_stop() as is_asked, Client() as client:
+        # It imports rclpy, which the client has found.
+        from composer.recordings.system_recorder import create_recorder
 
-        terminal, patterns = Terminal(), TopicPatterns(topics)
-        recorder = Recorder(find_place(target), terminal)
-        graph = GraphRecorder(node, recorder, patterns, terminal.warning)
-        graph.start()
-        terminal.info(f"recording to '{target}'; Ctrl-C ends it")
-        while recorder.room and not is_asked():
-            time.sleep(_POLL_SEC)
-        graph.stop()
-        recorder.finish(patterns.describe_unused(graph.topics))
-        return ExitCode.DONE if recorder.room else ExitCode.FAILED
+        recorder = create_recorder(target, topics, terminal)
+        try:
+            recorder.start(client.node.context)
+            terminal.info(f"recording to '{target}'; Ctrl-C ends it")
+            while recorder.sink.room and not is_asked():
+                time.sleep(_POLL_SEC)
+        finally:
+            recorder.stop()
+        return ExitCode.DONE if recorder.sink.room else ExitCode.FAILED

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from composer import signals
-from composer.cli.recording.graph_node import Terminal, graph_node
+from composer.application.running_systems.client import Client
+from composer.cli.recording.record import Terminal
 from composer.errors import ComposerError, ExitCode
+from composer.names import count_of
 from composer.recordings.reading import read_recording
 from composer.recordings.topic_patterns import TopicPatterns
 
@@ -61,8 +63,8 @@ def replay(
     if len(wanted) > _MOST_TOPICS:
         message = f"'{path}' has {len(wanted):,} topics, and {_MOST_TOPICS:,} are replayed at most"
         raise ComposerError(message, help='name some with --topics')
-    with signals.interrupting(), graph_node('_composer_replay', ros_arguments) as node:
-        # These import rclpy, which the node has found.
+    with signals.interrupting(), Client('_composer_replay', ros_arguments) as client:
+        # These import rclpy, which the client has found.
         from composer.recordings.publishing import RecordingPublisher
         from composer.recordings.types import MessageTypes
 
@@ -70,21 +72,20 @@ def replay(
         problems = _describe_problems(wanted, types)
         for problem in problems:
             terminal.warning(problem)
-        publisher = RecordingPublisher(node, wanted, types)
+        publisher = RecordingPublisher(client.node, wanted, types)
         if not publisher.topics:
             message = f"'{path}' has nothing to publish"
             raise ComposerError(message, help="see 'composer replay --help' for --topics")
         duration_sec = (recording.end_ns - recording.start_ns) / _NANOSECONDS
-        count = len(publisher.topics)
-        topics_word = 'topic' if count == 1 else 'topics'
-        terminal.info(f"replaying {count} {topics_word} of '{path}', {duration_sec:.1f} s")
+        topics_text = count_of(len(publisher.topics), 'topic')
+        terminal.info(f"replaying {topics_text} of '{path}', {duration_sec:.1f} s")
         publisher.wait_for_subscriptions(of_all=waits)
         since_ns = recording.start_ns + round(min(_LATEST_NS, start_sec * _NANOSECONDS))
         count = publisher.publish(recording, since_ns, rate)
         while loops:
             count += publisher.publish(recording, since_ns, rate)
         publisher.finish()
-    terminal.info(f'published {count} message{"" if count == 1 else "s"}')
+    terminal.info(f'published {count_of(count, "message")}')
     return ExitCode.FAILED if problems else ExitCode.DONE
 
 

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSCompatibility,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
+from rclpy.qos import HistoryPolicy, QoSCompatibility, qos_check_compatible
 
+from composer.language import qos
 from composer.network.transport_profile import PROFILE, PROFILE_VARIABLES
+from composer.runtime.messages.qos_profiles import write_policies
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rclpy.qos import QoSProfile
 
-# Longer durations are no limit.
-_LONGEST_NS: Final = 2**62
 _SYNCHRONOUS: Final = {'', 'SYNCHRONOUS'}
 # Each names a file that may change how Fast DDS delivers; Composer's own does not.
 _PROFILE_VARIABLES: Final = (
@@ -32,20 +25,7 @@ _PROFILE_VARIABLES: Final = (
 
 def why_sent(profile: QoSProfile) -> str:
     """Return which policy only the middleware keeps; empty if there is none."""
-    kept: dict[str, tuple[Any, ...]] = {
-        'durability': (DurabilityPolicy.VOLATILE,),
-        'history': (HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL),
-        'reliability': (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT),
-        'liveliness': (LivelinessPolicy.AUTOMATIC, LivelinessPolicy.SYSTEM_DEFAULT),
-    }
-    for name, policies in kept.items():
-        policy = getattr(profile, name)
-        if policy not in policies:
-            return f'{name}: {policy.name.lower()}'
-    for name in ('deadline', 'lifespan'):
-        if 0 < getattr(profile, name).nanoseconds < _LONGEST_NS:
-            return name
-    return ''
+    return qos.why_sent(write_policies(profile))
 
 
 def may_be_late(middleware: str, environment: Mapping[str, str]) -> bool:
