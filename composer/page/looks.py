@@ -29,7 +29,7 @@ def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
     """Return name, value, description, range and whether it may be set, of each.
 
     Raises:
-        ComposerError: The node does not answer.
+        ComposerError: There is no such node, or it does not answer.
     """
     from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
     from rclpy.parameter import parameter_value_to_python
@@ -38,6 +38,7 @@ def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
         return graph.call(f'{node}/{service}', service_class, service_class.Request(**asked))
 
     graph = LiveGraph(client, _ANSWER_SEC)
+    node = graph.find_node(node)
     names = sorted(ask('list_parameters', ListParameters).result.names)[:_MOST]
     descriptors = ask('describe_parameters', DescribeParameters, names=names).descriptors
     values = ask('get_parameters', GetParameters, names=names).values

@@ -12,30 +12,11 @@ from composer.application.system_reader import list_files
 from composer.drawing.json_document import describe_finding
 from composer.errors import ComposerError
 from composer.planning.text import render_plan
-from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
 _MOST_LINES = 200
-
-
-@record
-class RunningFiles:
-    """What a system runs from.
-
-    Attributes:
-        running: What it answers about itself.
-        paths: Its file and layers.
-        words: Its arguments.
-        set_values: Values that were set.
-    """
-
-    running: str
-    paths: Sequence[Path]
-    words: Sequence[str]
-    set_values: Sequence[str]
 
 
 class SavedFiles:
@@ -48,16 +29,18 @@ class SavedFiles:
 
     def __init__(self) -> None:
         self.next_plan: dict[str, Any] | None = None
-        self._given: RunningFiles | None = None
+        self._given: tuple[str, list[Path], list[str], list[str]] | None = None
         self._files: list[Path] = []
         self._times: dict[Path, int] = {}
         self._thread: threading.Thread | None = None
 
-    def follow(self, given: RunningFiles) -> None:
-        """Compare with this from now on."""
-        self._given = given
+    def follow(
+        self, running: str, paths: list[Path], words: list[str], set_values: list[str]
+    ) -> None:
+        """Compare from now on with what a system runs from; see `plan_from`."""
+        self._given = running, paths, words, set_values
         self.next_plan, self._times = None, {}
-        self._files = list(given.paths)
+        self._files = paths
 
     def look(self) -> None:
         """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
@@ -72,14 +55,12 @@ class SavedFiles:
             )
             self._thread.start()
 
-    def _plan(self, given: RunningFiles) -> None:
+    def _plan(self, given: tuple[str, list[Path], list[str], list[str]]) -> None:
         lines: list[str] = []
         findings: list[Any] = []
-        files, begun_ns = list(given.paths), time_ns()
+        files, begun_ns = given[1], time_ns()
         try:
-            plan, found, context = plan_from(
-                given.running, given.paths, given.words, given.set_values
-            )
+            plan, found, context = plan_from(*given)
             if context is not None:
                 files = sorted(list_files(context))
             if plan is None:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from composer.errors import ExitCode, UsageError
-from composer.page.server import PageServer
+from composer.errors import ComposerError, ExitCode, UsageError
 from composer.page.watched_system import DrawnFiles, WatchedSystem
 from composer.records import record
 
@@ -68,7 +67,11 @@ def serve(
         message = 'the page is served to this computer alone: it is not encrypted'
         advice = "ssh -L 8080:127.0.0.1:8080 HOST 'composer page --port 8080 --no-browser'"
         raise UsageError(message, help=f'tunnel it: {advice}')
-    source: DrawnFiles | WatchedSystem
+    try:
+        from composer.page.server import PageServer
+    except ImportError as error:
+        message = f'the page needs {error.name}, which is not installed'
+        raise ComposerError(message, help="pip install 'rclpy-composer[page]'") from error
     source = DrawnFiles(paths, words, set_values) if paths else WatchedSystem(name)
     server = PageServer(
         source, options.port, options.editor, allows_changes=options.allows_changes

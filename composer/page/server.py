@@ -10,29 +10,34 @@ import secrets
 import socket
 import sys
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import aclosing, suppress
 from importlib import resources
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import (
+    HTMLResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+    StreamingResponse,
+)
+from starlette.routing import Route
 
 from composer.errors import ComposerError
 from composer.page.looks import act, list_parameters, look_at_message, show_template
 from composer.page.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, MutableMapping
-    from typing import TypeAlias
+    from collections.abc import AsyncIterator, Awaitable, Callable
 
-    from starlette.requests import Request
-    from starlette.responses import Response
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
     from composer.application.running_systems.client import Client
-    from composer.page.watched_system import DrawnFiles, WatchedSystem
-
-    Scope: TypeAlias = MutableMapping[str, Any]
-    Receive: TypeAlias = Callable[[], Awaitable[Scope]]
-    Send: TypeAlias = Callable[[Scope], Awaitable[None]]
-    Application: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
+    from composer.page.watched_system import DrawnFiles
 
 _HEADERS = {
     'cache-control': 'no-store',
@@ -56,6 +61,7 @@ _SHORTEST_PAUSE_SEC = 0.25
 _ANSWER_SEC = 12.0
 _ACT_SEC = 70.0
 _LONGEST_WISH = 100_000
+_MOST_DIGITS = 20
 # Of a message, and of each text in the state: 1 MB would come with each period.
 _LONGEST_TEXT, _LONGEST_WORDS = 100_000, 10_000
 _ASSETS = {'page.css': 'text/css', 'page.js': 'text/javascript'}
@@ -71,7 +77,7 @@ class PageServer:
         allows_changes: Whether the page may change the system.
 
     Raises:
-        ComposerError: The port is taken, or the extra `page` is missing.
+        ComposerError: The port is taken.
 
     Attributes:
         address: With the secret, which is good for one browser after the other.
@@ -79,24 +85,18 @@ class PageServer:
 
     def __init__(
         self,
-        source: DrawnFiles | WatchedSystem,
+        source: DrawnFiles,
         port: int,
         editor: str = '',
         *,
         allows_changes: bool = False,
     ) -> None:
-        try:
-            import starlette  # noqa: F401 - asked for at once
-            import uvicorn
-        except ImportError as error:
-            message = f'the page needs {error.name}, which is not installed'
-            raise ComposerError(message, help="pip install 'rclpy-composer[page]'") from error
-        self._uvicorn = uvicorn
         self._source = source
         self._secret = secrets.token_urlsafe(32)
         self._settings = {'allows_changes': allows_changes, 'editor': editor}
         self._recording = Recording()
-        self._streams, self._asked = 0, monotonic()
+        self._asked = monotonic()
+        # Each window that has it open has one.
         self._wakers: set[asyncio.Event] = set()
         self._socket = socket.socket()
         try:
@@ -115,7 +115,7 @@ class PageServer:
 
     def run(self) -> None:
         """Serve until a signal comes."""
-        config = self._uvicorn.Config(
+        config = uvicorn.Config(
             self._guarded(self._routes()),
             log_config=None,
             access_log=False,
@@ -125,7 +125,7 @@ class PageServer:
             limit_concurrency=4 * _MOST_STREAMS,
             lifespan='off',
         )
-        server = self._uvicorn.Server(config)
+        server = uvicorn.Server(config)
         self._source.start()
         try:
             asyncio.run(self._serve(server))
@@ -134,7 +134,7 @@ class PageServer:
                 self._recording.end()
             self._source.stop()
 
-    async def _serve(self, server: Any) -> None:
+    async def _serve(self, server: uvicorn.Server) -> None:
         loop = asyncio.get_running_loop()
 
         def wake() -> None:
@@ -149,50 +149,42 @@ class PageServer:
         await server.serve(sockets=[self._socket])
 
     def _is_looked_at(self) -> bool:
-        return self._streams > 0 or monotonic() < self._asked + _LOOK_SEC
+        return bool(self._wakers) or monotonic() < self._asked + _LOOK_SEC
 
-    def _routes(self) -> Application:
-        from starlette.applications import Starlette
-        from starlette.routing import Route
-
+    def _routes(self) -> Starlette:
         return Starlette(
             routes=[
                 Route('/', self._page),
                 Route('/api/state', self._state),
+                Route('/api/events', self._events),
                 Route('/api/drawing', self._drawing),
                 Route('/api/log', self._log),
-                Route('/api/parameters', self._parameters),
-                Route('/api/message', self._message),
-                Route('/api/template', self._template),
+                Route('/api/parameters', self._asking(list_parameters, 'node')),
+                Route('/api/message', self._asking(look_at_message, 'topic')),
+                Route('/api/template', self._asking(show_template, 'kind', 'name')),
                 Route('/api/act', self._act, methods=['POST']),
                 Route('/{name}', self._asset),
             ]
         )
 
-    def _guarded(self, routes: Application) -> Application:
+    def _guarded(self, routes: Starlette) -> ASGIApp:
         """Return the application behind the checks of host, origin and secret."""
-        from starlette.requests import Request
-        from starlette.responses import PlainTextResponse
 
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             if scope['type'] != 'http':
                 return
-            request = Request(scope)
             self._asked = monotonic()
 
-            async def send_guarded(message: Scope) -> None:
+            async def send_guarded(message: Message) -> None:
                 if message['type'] == 'http.response.start':
                     added = [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
                     message = {**message, 'headers': [*message['headers'], *added]}
-                await send(message)
+                await asyncio.wait_for(send(message), _SEND_SEC)
 
-            if refusal := self._refuse(request):
-                answer = PlainTextResponse(refusal, status_code=403)
+            refusal = self._refuse(Request(scope))
+            answer = PlainTextResponse(refusal, status_code=403) if refusal else routes
+            with suppress(TimeoutError):
                 await answer(scope, receive, send_guarded)
-            elif scope['path'] == '/api/events':
-                await self._stream(receive, send_guarded)
-            else:
-                await routes(scope, receive, send_guarded)
 
         return guarded
 
@@ -221,8 +213,6 @@ class PageServer:
         return hmac.compare_digest(text.encode(), self._secret.encode())
 
     async def _page(self, request: Request) -> Response:
-        from starlette.responses import HTMLResponse, RedirectResponse
-
         if self._brings_secret(request):
             answer = RedirectResponse('/', status_code=303)
             answer.set_cookie(self._cookie, self._secret, httponly=True, samesite='strict')
@@ -230,8 +220,6 @@ class PageServer:
         return HTMLResponse(_read_asset('page.html'))
 
     async def _asset(self, request: Request) -> Response:
-        from starlette.responses import Response
-
         name = request.path_params['name']
         if name not in _ASSETS:
             return Response(status_code=404)
@@ -254,23 +242,19 @@ class PageServer:
 
     async def _log(self, request: Request) -> Response:
         after = request.query_params.get('after', '0')
-        number = int(after) if after.isdecimal() else 0
+        number = int(after) if after.isdecimal() and len(after) < _MOST_DIGITS else 0
         return _json([each for each in list(self._source.log) if each['number'] > number])
 
-    async def _parameters(self, request: Request) -> Response:
-        node = request.query_params.get('node', '')
-        known = self._source.state.get('status', {}).get('nodes', [])
-        if node not in known:
-            return _json({'problem': 'there is no such node'}, 404)
-        return await self._ask(lambda client: list_parameters(client, node))
+    def _asking(
+        self, question: Callable[..., Any], *names: str
+    ) -> Callable[[Request], Awaitable[Response]]:
+        """Return what asks the graph, with values of the address."""
 
-    async def _message(self, request: Request) -> Response:
-        topic = request.query_params.get('topic', '')
-        return await self._ask(lambda client: look_at_message(client, topic))
+        async def asking(request: Request) -> Response:
+            values = [request.query_params.get(name, '') for name in names]
+            return await self._ask(lambda client: question(client, *values))
 
-    async def _template(self, request: Request) -> Response:
-        kind, name = (request.query_params.get(each, '') for each in ('kind', 'name'))
-        return await self._ask(lambda client: show_template(client, kind, name))
+        return asking
 
     async def _act(self, request: Request) -> Response:
         body = b''
@@ -280,7 +264,7 @@ class PageServer:
                 return _json({'problem': 'that is too long'}, 413)
         try:
             wish = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
             wish = None
         if not isinstance(wish, dict) or not all(isinstance(each, str) for each in wish.values()):
             return _json({'problem': 'a wish is a mapping of texts'}, 400)
@@ -297,48 +281,38 @@ class PageServer:
         self._source.ask(question, future)
         try:
             return _json(await asyncio.wait_for(asyncio.wrap_future(future), timeout_sec))
-        except (ComposerError, TimeoutError) as error:
+        except Exception as error:  # noqa: BLE001 - rclpy raises many kinds
             more = getattr(error, 'help', None)
             text = str(error) or 'no answer'
             return _json({'problem': f'{text} ({more})' if more else text}, 504)
 
-    async def _stream(self, receive: Receive, send: Send) -> None:
-        """Send the newest state after each change, until the browser leaves or does not read."""
-        from starlette.responses import PlainTextResponse
+    async def _events(self, _request: Request) -> Response:
+        if len(self._wakers) >= _MOST_STREAMS:
+            return PlainTextResponse(f'{_MOST_STREAMS} windows have it open', status_code=503)
+        return _Events(self._list_states(), media_type='text/event-stream')
 
-        if self._streams >= _MOST_STREAMS:
-            message = f'{_MOST_STREAMS} windows have it open'
-            await PlainTextResponse(message, status_code=503)({'type': 'http'}, receive, send)
-            return
+    async def _list_states(self) -> AsyncIterator[str]:
+        """Yield the newest state after each change."""
         waker = asyncio.Event()
         self._wakers.add(waker)
-        self._streams += 1
-        left = asyncio.ensure_future(_wait_until_left(receive))
         try:
-            headers = [(b'content-type', b'text/event-stream')]
-            await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
-            while not left.done():
+            while True:
                 waker.clear()
-                text = f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
-                body = {'type': 'http.response.body', 'body': text.encode(), 'more_body': True}
-                await asyncio.wait_for(send(body), _SEND_SEC)
-                await asyncio.wait([left], timeout=_SHORTEST_PAUSE_SEC)
-                changed = asyncio.ensure_future(waker.wait())
-                await asyncio.wait(
-                    [changed, left], timeout=_KEEP_ALIVE_SEC, return_when=asyncio.FIRST_COMPLETED
-                )
-                changed.cancel()
-        except TimeoutError:
-            pass
+                yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
+                await asyncio.sleep(_SHORTEST_PAUSE_SEC)
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(waker.wait(), _KEEP_ALIVE_SEC)
         finally:
-            left.cancel()
-            self._streams -= 1
             self._wakers.discard(waker)
 
 
-async def _wait_until_left(receive: Receive) -> None:
-    while (await receive())['type'] != 'http.disconnect':
-        pass
+class _Events(StreamingResponse):
+    """Ends its iterator, too, when the browser leaves or does not read."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        iterator: Any = self.body_iterator
+        async with aclosing(iterator):
+            await super().__call__(scope, receive, send)
 
 
 def _read_asset(name: str) -> str:
@@ -346,8 +320,6 @@ def _read_asset(name: str) -> str:
 
 
 def _json(data: Any, code: int = 200, longest: int = _LONGEST_TEXT) -> Response:
-    from starlette.responses import Response
-
     return Response(_dump(data, longest), status_code=code, media_type='application/json')
 
 

@@ -25,7 +25,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.page.drawn_parts import describe_drawing, list_code
 from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
-from composer.page.saved_files import RunningFiles, SavedFiles
+from composer.page.saved_files import SavedFiles
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
@@ -105,44 +105,35 @@ class Drawing:
     def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
         """Return it with the ends outside of topics, too, laid out in the same direction."""
         sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
-        channels = [
-            replace(
-                channel,
-                external=tuple(
-                    dict.fromkeys(
-                        (
-                            *channel.external,
-                            *(sides[end['kind']] for end in outside[channel.id[6:]]),
-                        )
-                    )
-                ),
-            )
-            if channel.kind == 'topic' and channel.id[6:] in outside
-            else channel
-            for channel in self._picture.channels
-        ]
+        channels = []
+        for channel in self._picture.channels:
+            ends = outside.get(channel.name, ()) if channel.kind == 'topic' else ()
+            shown = dict.fromkeys((*channel.external, *(sides[end['kind']] for end in ends)))
+            channels.append(replace(channel, external=tuple(shown)))
         picture = replace(self._picture, channels=tuple(channels))
         return Drawing(picture, self._code, self.shown['direction'])
 
 
 class DrawnFiles:
-    """Stands for a system that does not run.
+    """A system that does not run.
 
     Attributes:
         state: What the page shows, but for the drawing.
         drawing: Of its files; `None` if they cannot be drawn.
+        log: The last lines of `/rosout`.
+        system: As it was found; `None` if it does not run.
         changed: Called after each change of one of them.
         is_looked_at: Returns whether somebody looks.
     """
 
     def __init__(
-        self, paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]
+        self, paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
     ) -> None:
-        self.drawing: Drawing | None = draw_files(paths, words, set_values)
-        name = self.drawing.shown['name']
+        self.drawing = draw_files(paths, words, set_values) if paths else None
+        name = self.drawing.shown['name'] if self.drawing else ''
         self.state: dict[str, Any] = {'name': name, 'runs': False, 'drawing': 1}
-        self.log: deque[dict[str, Any]] = deque()
-        self.system = None
+        self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
+        self.system: RunningSystem | None = None
         self.is_looked_at: Callable[[], bool] = lambda: True
         self.changed: Callable[[], object] = lambda: None
 
@@ -152,34 +143,30 @@ class DrawnFiles:
     def stop(self) -> None:
         """There is nothing to end."""
 
-    def ask(self, _question: Callable[[Any], Any], future: Future[Any]) -> None:
+    def ask(self, _question: Callable[[Client], Any], future: Future[Any]) -> None:
         """Nobody answers."""
         future.set_exception(ComposerError('the system does not run'))
 
 
-class WatchedSystem:
-    """Asks a running system in a thread of its own; see `DrawnFiles`.
+class WatchedSystem(DrawnFiles):
+    """Asks a running system in a thread of its own.
 
     Args:
         name: Of the system; `None` for the only one.
     """
 
     def __init__(self, name: str | None) -> None:
+        super().__init__(())
         self._name = name
-        self.drawing: Drawing | None = None
-        self.state: dict[str, Any] = {'name': name or '', 'runs': False}
-        self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
-        self.system: RunningSystem | None = None
+        self.state = {'name': name or '', 'runs': False}
         self._saved = SavedFiles()
-        self.is_looked_at: Callable[[], bool] = lambda: True
-        self.changed: Callable[[], object] = lambda: None
         self._lines = 0
         self._rows: list[dict[str, Any]] = []
         # As the files say, without ends outside.
         self._declared: Drawing | None = None
         self._topics: Mapping[str, str] = {}
         self._outside = OutsideEnds()
-        self._questions: SimpleQueue[tuple[Callable[[Any], Any], Future[Any]]] = SimpleQueue()
+        self._questions: SimpleQueue[tuple[Callable[[Client], Any], Future[Any]]] = SimpleQueue()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
         # What is asked, as a reload, may take long: what is watched stays fresh meanwhile.
@@ -196,7 +183,7 @@ class WatchedSystem:
         if self._answerer.ident is not None:
             self._answerer.join(STATUS_SEC)
 
-    def ask(self, question: Callable[[Any], Any], future: Future[Any]) -> None:
+    def ask(self, question: Callable[[Client], Any], future: Future[Any]) -> None:
         """Have a thread call a function with a client, and fill a future."""
         self._questions.put((question, future))
 
@@ -221,7 +208,7 @@ class WatchedSystem:
             ):
                 self._draw(client, system)
                 self._follow(client, system, ask_status, ask_health)
-        except ComposerError as error:
+        except Exception as error:  # noqa: BLE001 - the page shows it, and asks again
             self.system = None
             self._tell({'runs': False, 'problem': str(error)})
             self._spin(client, monotonic() + 1.0)
@@ -286,7 +273,7 @@ class WatchedSystem:
             given = answer_forms.read_answer(text, answer_forms.SNAPSHOT)['given']
             file = Path((system.status or {}).get('file', ''))
             paths = [file, *(Path(each) for each in given['layers'])]
-            self._saved.follow(RunningFiles(text, paths, given['words'], given['set_values']))
+            self._saved.follow(text, paths, given['words'], given['set_values'])
             self._declared = draw_files(paths, given['words'], given['set_values'])
             self._topics = self._declared.topic_of_ends
         except (ComposerError, DrawingError) as error:
@@ -338,6 +325,9 @@ class WatchedSystem:
             while not self._ended.is_set():
                 with suppress(Empty):
                     question, future = self._questions.get(timeout=_POLL_SEC)
+                    # Who asked may have given up while others were answered.
+                    if not future.set_running_or_notify_cancel():
+                        continue
                     try:
                         future.set_result(question(client))
                     except Exception as error:  # noqa: BLE001 - it is told to who asked

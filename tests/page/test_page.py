@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,8 @@ pytest.importorskip('starlette')
 pytest.importorskip('uvicorn')
 
 from composer.page.problems import list_problems
-from tests.running import wait_for
+from composer.page.watched_system import WatchedSystem
+from tests.running import DEADLINE_SEC, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -183,6 +185,7 @@ def test_it_changes_what_it_may(acting, wish, told):
         ({'action': 'leave'}, 504, "no action 'leave'"),
         ({'action': 3}, 400, 'mapping of texts'),
         ('[', 400, 'mapping of texts'),
+        pytest.param('[' * 90_000, 400, 'mapping of texts', id='deep'),
         ('"' + 'x' * 200_000 + '"', 413, 'too long'),
     ],
     ids=str,
@@ -207,6 +210,19 @@ def test_others_change_nothing(acting, page, headers):
     wish = {'action': 'restart', 'name': '/left/talker'}
     assert acting.act(wish, **headers)[0] == 403
     assert page.act(wish)[0] == 403
+
+
+def test_a_question_that_somebody_gave_up_keeps_no_other_from_an_answer(domain_id):
+    source = WatchedSystem('nobody')
+    source.start()
+    given_up, asked = Future(), Future()
+    given_up.cancel()
+    try:
+        source.ask(lambda client: client.domain_id, given_up)
+        source.ask(lambda client: client.domain_id, asked)
+        assert asked.result(DEADLINE_SEC) == domain_id
+    finally:
+        source.stop()
 
 
 def test_it_records(acting):
@@ -310,6 +326,8 @@ def test_what_somebody_asks_for_is_there(page):
     lines = wait_for(lambda: page.json('/api/log'), 'the log')
     assert EVIL in {each['text'] for each in lines}
     assert page.json(f'/api/log?after={lines[0]["number"]}')[:1] != lines[:1]
+    assert page.json(f'/api/log?after={"9" * 5000}') is not None
+    assert "no node 'a b'" in page.json('/api/parameters?node=a%20b')['problem']
 
 
 @pytest.mark.parametrize('path', ['/', '/api/state', '/api/events', '/api/log', '/page.js'])
