@@ -45,6 +45,8 @@ _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Mult: operator.mul,
     ast.Sub: operator.sub,
 }
+# Longer lists are not written out to be measured.
+_MOST_REPEATED = 10_000
 
 
 class NotLiteralError(ComposerError):
@@ -62,6 +64,10 @@ def literal_of(node: ast.expr) -> object:
             return value
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return -_number(operand)
+        case ast.BinOp(left=ast.List(elts=[item]), op=ast.Mult(), right=right):
+            times = _number(right)
+            if isinstance(times, int) and times <= _MOST_REPEATED:
+                return [literal_of(item)] * times
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
             return _OPERATORS[type(op)](_number(left), _number(right))
         case ast.List(elts=items) | ast.Tuple(elts=items):

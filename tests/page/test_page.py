@@ -471,6 +471,8 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
     os.kill(child.pid, signal.SIGSTOP)
     try:
         wait_for(lambda: old() >= everything, 'an old page')
+        # What is old is still read.
+        assert find_violations(browser, []) == []
     finally:
         os.kill(child.pid, signal.SIGCONT)
     browser.get('about:blank')

@@ -6,7 +6,10 @@ A report that says nothing certain of a node or a message is none.
 from __future__ import annotations
 
 import ast
+import builtins
 import re
+import sys
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -28,7 +31,6 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Related
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.specs import NodeSpec
-    from composer.python_source.syntax import FunctionNode
     from composer.stubs.checking.received_values import FunctionKey, FunctionUse, Received
     from composer.stubs.checking.type_checker import TypeReport
     from composer.stubs.node_shapes import NodeShape
@@ -53,6 +55,8 @@ _DICT = re.compile(r'^dict\[str, (.*)\]$')
 _TIME = re.compile(r'^rclpy\.\w+\.(Time|Duration)$')
 _UNARY = re.compile(r'Type `([^`]+)` is not (?:iterable|awaitable)')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
+_ITEMS = re.compile(r'(?:list|set|tuple)\[([^\[\],]+)\]')
+_INDEXED = re.compile(r'Cannot (?:index into|set item in) `(\w+)[^`]*`')
 # A value that no plain field takes.
 _COLLECTION = re.compile(r'(?:dict|list|set|tuple)\[[^|]*\]')
 _PARTS = {
@@ -72,6 +76,11 @@ _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
 _TIMES = frozenset({'Time', 'Duration'})
+_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+# Functions and modules whose types are those of Python itself.
+_OF_PYTHON = frozenset({*dir(builtins), *sys.stdlib_module_names})
+# Classes of Python, of which fields and parameters are.
+_PLAIN_OWNERS = _SCALARS | {'array', 'list', 'Mapping'}
 
 
 @record
@@ -121,6 +130,7 @@ class TypeFindings:
         return {
             'bad-argument-count': self._count,
             'bad-argument-type': self._argument,
+            'bad-index': self._index,
             'bad-return': self._return,
             'bad-specialization': self._bound,
             'incompatible-comparison': self._comparison,
@@ -157,7 +167,7 @@ class TypeFindings:
 
     # Attributes
 
-    def _attribute(self, place: ReportedPlace) -> _Problem | None:
+    def _attribute(self, place: ReportedPlace) -> _Problem | None:  # noqa: C901, PLR0911
         match = _ATTRIBUTE.search(place.report.message)
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
@@ -177,6 +187,16 @@ class TypeFindings:
             if is_value and isinstance(node.value, ast.Attribute):
                 is_typo_of = is_typo_of or self._is_of_one_type(place, node.value)
                 advice = 'this is the value itself' if name == 'value' else advice
+            if owner in _PLAIN_OWNERS:
+                is_typo_of = is_typo_of or self._is_declared(place, node.value)
+            if owner == 'Mapping' and is_typo_of:
+                of = ast.unparse(node.value)
+                return (
+                    node,
+                    'unknown-attribute',
+                    f"'{of}' has no attribute '{name}'",
+                    (f"write {of}['{name}']"),
+                )
             if not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
                 return None
             advice = OF_RCLPY.get(name, advice)
@@ -243,6 +263,8 @@ class TypeFindings:
 
     def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value is no union, of which reports name the part that does not fit."""
+        if self._is_declared(place, value):
+            return True
         while isinstance(value, ast.Attribute | ast.Subscript):
             value = value.value
         value = value.value if isinstance(value, ast.Await) else value
@@ -256,6 +278,34 @@ class TypeFindings:
             return is_received or bool(_INTERFACE.search(imports.get(value.id, '')))
         return len(stored) == 1 and _is_made(imports, stored[0])
 
+    def _is_declared(
+        self, place: ReportedPlace, value: ast.expr, seen: frozenset[str] = frozenset()
+    ) -> bool:
+        """Return whether a value comes from the node or a message, in one way only.
+
+        The state is left out: what a name of it stands for may change.
+        """
+        imports = place.syntax.copy.module.source.imports
+        while not isinstance(value, ast.Name):
+            match value:
+                case ast.Call(func=ast.Name(id=name)):
+                    return bool(_INTERFACE.search(imports.get(name, '')))
+                case ast.Attribute(attr='state'):
+                    return False
+                case ast.Call(func=inner) | ast.Attribute(value=inner):
+                    value = inner
+                case ast.Subscript(value=inner) | ast.Await(value=inner):
+                    value = inner
+                case _:
+                    return False
+        stored = _sources(place, value.id)
+        if stored is None:
+            use = self._use(place)
+            return bool(use and value.id in use.received)
+        if len(stored) > 1 or stored[0] is None or value.id in seen:
+            return False
+        return self._is_declared(place, stored[0], seen | {value.id})
+
     # Arguments
 
     def _argument(self, place: ReportedPlace) -> _Problem | None:
@@ -268,7 +318,8 @@ class TypeFindings:
         given = _TIME.sub(r'\1', given)
         module, _, method = function.rpartition('.')
         owner = module.rpartition('.')[2]
-        if owner in self.nodes and method in _SECTIONS:
+        is_sent = owner in self.nodes and method in _SECTIONS
+        if is_sent and parameter in ('', 'name', 'payload'):
             return self._sent(place, owner, method, given)
         if not place.values:
             return None
@@ -282,21 +333,41 @@ class TypeFindings:
         if function == 'list.append' and self.messages.get(wanted) and given in _SCALARS:
             message = f'expected {self._shown(wanted)}, got {given}'
             return value, 'field-type', message, None
-        return self._passed(place, value, given, function)
+        return self._passed(place, value, given, wanted, parameter, function)
 
     def _passed(
-        self, place: ReportedPlace, value: ast.expr, given: str, function: str
+        self,
+        place: ReportedPlace,
+        value: ast.expr,
+        given: str,
+        wanted: str,
+        parameter: str,
+        function: str,
     ) -> _Problem | None:
-        """Return that a function of Python is given a node or a message that it cannot take."""
-        packages = {name.partition('.')[0] for name in self.modules}
-        is_known = given in self.nodes or self.messages.get(given)
-        if function.partition('.')[0] in {*packages, 'composer', 'composer_stubs'} or not is_known:
+        """Return that a function of Python or of the node is given what it cannot take."""
+        names, method = _certain(given), function.rpartition('.')[2]
+        package = function.partition('.')[0]
+        is_certain = self._is_declared(place, value)
+        call = place.calls[0] if place.calls else None
+        if call is not None and isinstance(value, ast.Constant):
+            # What is called is of a message.
+            func = call.func
+            is_certain = isinstance(func, ast.Attribute) and self._is_declared(place, func)
+        if package in ('composer', 'composer_stubs'):
+            if names is None or not (is_certain or isinstance(value, ast.Constant)):
+                return None
+            message = f"{method}() takes {wanted} as '{parameter}', got {self._shown(given)}"
+            return value, 'bad-call', message, None
+        if package in {name.partition('.')[0] for name in self.modules}:
             return None
-        if given in self.own or not self._is_of_one_type(place, value):
-            return None
-        what = 'a node' if given in self.nodes else self._shown(given)
+        if given in self.nodes or (self.messages.get(given) and given not in self.own):
+            what = 'a node' if given in self.nodes else self._shown(given)
+            is_certain = self._is_of_one_type(place, value)
+        else:
+            what = self._shown(given)
+            is_certain &= names is not None and package in _OF_PYTHON
         message = f'{function.removeprefix("builtins.")}() does not take {what}'
-        return value, 'bad-call', message, None
+        return (value, 'bad-call', message, None) if is_certain else None
 
     def _sent(self, place: ReportedPlace, owner: str, method: str, given: str) -> _Problem | None:
         calls = (call for call in place.calls if getattr(call.func, 'attr', '') == method)
@@ -383,11 +454,11 @@ class TypeFindings:
         nested = of_type and of_type.nested and self.context.types.describe(of_type.nested)
         if nested and isinstance(value, ast.Dict) and of_type and not of_type.array:
             return self._display(nested, value, given)
-        if nested and isinstance(value, ast.List | ast.Tuple):
+        if nested and of_type and of_type.array and isinstance(value, ast.List | ast.Tuple):
             entries = [entry for entry in value.elts if isinstance(entry, ast.Dict)]
             return next(filter(None, (self._display(nested, each, '') for each in entries)), None)
         if of_type and isinstance(value, _DISPLAYS) and not of_type.array:
-            if of_type.nested:
+            if of_type.nested and (not nested or len(nested.fields) <= 1):
                 return None
             kind = 'dict' if isinstance(value, ast.Dict) else 'list'
             message = f'{in_python(description.name)}: {name}: expected {of_type}, got {kind}'
@@ -409,10 +480,15 @@ class TypeFindings:
         if field is None:
             return None
         is_wrong = self._is_other_message(field.type, given, is_stored=is_stored)
-        is_plain = not (field.type.array or field.type.nested)
-        is_wrong |= is_plain and _COLLECTION.fullmatch(given) is not None
+        is_single = not field.type.array and (is_stored or not field.type.nested)
+        is_wrong |= is_single and _COLLECTION.fullmatch(given) is not None
         names = _certain(given)
         fits = not names or any(self._fits(field.type, each, is_stored) for each in names)
+        items = _ITEMS.fullmatch(given)
+        if items and field.type.array and not field.type.nested:
+            of_item = replace(field.type, array=None)
+            names = _certain(items[1])
+            fits = not names or any(self._fits(of_item, each, is_stored) for each in names)
         if fits and not is_wrong:
             return None
         is_int = is_stored and names == {'int'} and field.type.kind in _FLOATS
@@ -453,7 +529,7 @@ class TypeFindings:
             return f'{_PARTS[given]} of rclpy'
         if full_name := self.messages.get(given):
             return in_python(full_name)
-        return _LITERAL.sub(lambda match: type(ast.literal_eval(match[1])).__name__, given)
+        return _LITERAL.sub(_type_of_literal, given)
 
     # Calls, operators and comparisons
 
@@ -483,19 +559,23 @@ class TypeFindings:
         return place.calls[0], 'bad-call', f'{full_name} takes its fields by name only', None
 
     def _operation(self, place: ReportedPlace) -> _Problem | None:
+        if _INDEXED.search(place.report.message):
+            return self._index(place)
         match = _OPERANDS.search(place.report.message)
         values = [node for node in place.values if isinstance(node, ast.BinOp | ast.Compare)]
         if match is None or not values:
             return None
-        operands = {match[2], match[3]}
+        given = [match[2], match[3]]
+        given = [_LITERAL.sub(_type_of_literal, each).partition('[')[0] for each in given]
         known = {*_TIMES, *self.messages} - self.own
-        if not operands & known or not operands <= _SCALARS | known:
+        if not {*given} <= _PLAIN_OWNERS | known:
             return None
         parts = [node for node in ast.iter_child_nodes(values[0]) if isinstance(node, ast.expr)]
-        parts = [part for part in parts if not isinstance(part, ast.Constant)]
-        if not all(self._is_of_one_type(place, part) for part in parts):
+        parts = [part for part in parts if not isinstance(part, ast.Constant | ast.List)]
+        is_certain = self._is_of_one_type if {*given} & known else self._is_declared
+        if not all(is_certain(place, part) for part in parts):
             return None
-        left, right = (_PARTS.get(each) or self._shown(each) for each in (match[2], match[3]))
+        left, right = (_PARTS.get(each) or self._shown(each) for each in given)
         message = f"'{match[1]}' is not possible between {left} and {right}"
         return values[0], 'bad-call', message, None
 
@@ -506,9 +586,32 @@ class TypeFindings:
             return None
         return place.calls[0], 'bad-call', f'{self._shown(given[1])} cannot be compared', None
 
+    def _index(self, place: ReportedPlace) -> _Problem | None:
+        """Return an item that a message, a number or an array does not have."""
+        given = _INDEXED.search(place.report.message)
+        values = [node for node in place.values if isinstance(node, ast.Subscript)]
+        if given is None or not values or not self._is_declared(place, values[0].value):
+            return None
+        owner, key = given[1], values[0].slice
+        if self._is_message(owner):
+            advice = None
+            if isinstance(key, ast.Constant) and isinstance(key.value, str):
+                advice = f'write .{key.value}'
+            return values[0], 'bad-call', f'{self._shown(owner)} has no items', advice
+        if owner in ('array', 'list') and isinstance(key, ast.Constant):
+            message = f'an array has items by number, not by {type(key.value).__name__}'
+            return key, 'bad-call', message, None
+        message = f"'{owner}' has no items"
+        return (values[0], 'bad-call', message, None) if owner in _SCALARS - {'str'} else None
+
     def _iteration(self, place: ReportedPlace) -> _Problem | None:
         given = _UNARY.search(place.report.message)
-        values = [node for node in place.values if isinstance(node, ast.Attribute)]
+        values: list[ast.expr] = [
+            node for node in place.values if isinstance(node, ast.Attribute | ast.Name)
+        ]
+        for node in place.around:
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+                values = [node.value]
         if given is None or not values or not self._is_of_one_type(place, values[0]):
             return None
         if given[1] not in {'bool', 'float', 'int'} and not self._is_message(given[1]):
@@ -525,13 +628,15 @@ class TypeFindings:
         return value, 'missing-await', message, 'leave out the await'
 
     def _called(self, place: ReportedPlace) -> _Problem | None:
-        """Return an attribute of the node that is no method."""
+        """Return an attribute that is no method, and is called."""
         owner = re.search(r'got `(\w+)`', place.report.message)
-        what = _PARTS.get(owner[1]) if owner and owner[1] not in self.own else None
-        for node in place.values if what else ():
-            match node:
-                case ast.Call(func=ast.Attribute(value=ast.Name(), attr=name) as func):
-                    return func, 'bad-call', f"'{name}' is {what}: no method", None
+        what = owner[1] if owner and owner[1] not in self.own else ''
+        for node in place.values:
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                is_certain = what in _SCALARS and self._is_declared(place, node.func)
+                if is_certain or (what in _PARTS and isinstance(node.func.value, ast.Name)):
+                    message = f"'{node.func.attr}' is {_PARTS.get(what, what)}: no method"
+                    return node.func, 'bad-call', message, None
         return None
 
     def _unused(self, place: ReportedPlace) -> _Problem | None:
@@ -545,7 +650,9 @@ class TypeFindings:
     def _comparison(self, place: ReportedPlace) -> _Problem | None:
         """Return a field or a parameter that is compared with a constant of another type."""
         types = _COMPARED.search(place.report.message)
-        found = [node for node in place.values if isinstance(node, ast.Compare)]
+        # It is at what is compared, or at the constant.
+        near = [*place.values, *place.around[:2]]
+        found = [node for node in near if isinstance(node, ast.Compare)]
         if types is None or not found or len(found[0].ops) > 1:
             return None
         left, right = found[0].left, found[0].comparators[0]
@@ -604,19 +711,86 @@ def _is_made(imports: Mapping[str, str], value: ast.expr | None) -> bool:
     return False
 
 
-def _stored(function: FunctionNode) -> dict[str, list[ast.expr | None]]:
-    """Return what a function assigns, by name; `None` for what no assignment shows."""
+def _sources(place: ReportedPlace, name: str) -> list[ast.expr | None] | None:
+    """Return what a name stands for where a report is; see `_stored`."""
+    for node, above in zip(place.around, [*place.around[1:], None], strict=True):
+        inner = [node]
+        if isinstance(node, _COMPREHENSIONS):
+            inner = [*node.generators]
+        elif isinstance(node, ast.Lambda) and above is not None:
+            inner = [above]
+        elif not isinstance(node, ast.For) or len(_stored(node).get(name, ())) > 1:
+            continue
+        for each in inner:
+            for target, value in _bindings(each):
+                if name == (target.arg if isinstance(target, ast.arg) else target.id):
+                    return [value]
+        if isinstance(node, ast.Lambda) and name in {each.arg for each in node.args.args}:
+            return [None]
+    return _stored(place.function).get(name) if place.function else None
+
+
+def _stored(syntax: ast.AST) -> dict[str, list[ast.expr | None]]:
+    """Return what a function or a loop binds, by name: the value, or what it is one of.
+
+    `None` stands for what nothing shows. What is bound in an expression alone is left out.
+    """
     stored: dict[str, list[ast.expr | None]] = {}
     shown: set[int] = set()
-    for node in ast.walk(function):
-        for target in node.targets if isinstance(node, ast.Assign) else ():
-            if isinstance(target, ast.Name) and isinstance(node, ast.Assign):
-                shown.add(id(target))
-                stored.setdefault(target.id, []).append(node.value)
+    for node in ast.walk(syntax):
+        for target, value in _bindings(node):
+            shown.add(id(target))
+            if isinstance(target, ast.Name) and not isinstance(node, ast.comprehension):
+                stored.setdefault(target.id, []).append(value)
         is_name = isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
-        if isinstance(node, ast.Name) and is_name and id(node) not in shown:
+        if isinstance(node, ast.comprehension):
+            shown |= {id(each) for each in ast.walk(node.target)}
+        elif isinstance(node, ast.Name) and is_name and id(node) not in shown:
             stored.setdefault(node.id, []).append(None)
     return stored
+
+
+def _bindings(node: ast.AST) -> Iterator[tuple[ast.Name | ast.arg, ast.expr]]:
+    """Yield the names that a statement or an expression binds, with what tells their type."""
+    match node:
+        case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
+            pairs = list(zip(names, values, strict=False)) if len(names) == len(values) else []
+        case ast.Assign(targets=targets, value=value):
+            pairs = [(target, value) for target in targets]
+        case ast.NamedExpr(target=name, value=value):
+            pairs = [(name, value)]
+        case ast.For(target=target, iter=items) | ast.comprehension(target=target, iter=items):
+            pairs = _taken(target, items)
+        case ast.Call(func=ast.Name(id='max' | 'min' | 'sorted'), args=[items], keywords=keywords):
+            keys = (each.value for each in keywords if each.arg == 'key')
+            for key in keys:
+                if isinstance(key, ast.Lambda) and len(key.args.args) == 1:
+                    yield key.args.args[0], items
+            return
+        case ast.Call(func=ast.Name(id='map' | 'filter'), args=[ast.Lambda() as key, items]):
+            if len(key.args.args) == 1:
+                yield key.args.args[0], items
+            return
+        case _:
+            return
+    yield from ((name, value) for name, value in pairs if isinstance(name, ast.Name))
+
+
+def _taken(target: ast.expr, items: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
+    """Return the names of a loop with what their values are taken from."""
+    match target, items:
+        case ast.Tuple(elts=[_, inner]), ast.Call(func=ast.Name(id='enumerate'), args=[of, *_]):
+            return _taken(inner, of)
+        case ast.Tuple(elts=names), ast.Call(func=ast.Name(id='zip'), args=several):
+            if len(names) == len(several):
+                pairs = zip(names, several, strict=True)
+                return [pair for name, of in pairs for pair in _taken(name, of)]
+            return []
+        case ast.Name(), ast.Call(func=ast.Name(id='reversed' | 'sorted' | 'list'), args=[of]):
+            return [(target, of)]
+        case ast.Name(), _:
+            return [(target, items)]
+    return []
 
 
 def _missing_return(use: FunctionUse) -> _Problem | None:
@@ -632,12 +806,13 @@ def _missing_return(use: FunctionUse) -> _Problem | None:
     return name, 'missing-return', message, 'return something at its end'
 
 
+def _type_of_literal(literal: re.Match[str]) -> str:
+    return type(ast.literal_eval(literal[1])).__name__
+
+
 def _certain(given: str) -> set[str] | None:
     """Return the plain types that a value has; `None` if it may have others."""
-    names = {
-        type(ast.literal_eval(match[1])).__name__ if (match := _LITERAL.fullmatch(each)) else each
-        for each in given.split(' | ')
-    }
+    names = {_LITERAL.sub(_type_of_literal, each) for each in given.split(' | ')}
     return names if names <= _SCALARS else None
 
 
