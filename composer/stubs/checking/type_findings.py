@@ -707,7 +707,7 @@ def _is_made(imports: Mapping[str, str], value: ast.expr | None) -> bool:
         case ast.Call(func=ast.Name(id=name)):
             return bool(_INTERFACE.search(imports.get(name, '')))
         case ast.Call(func=ast.Attribute()) | ast.Attribute() | ast.BinOp():
-            return not words_in(value) & {'self', 'cls'}
+            return not words_in(value) & {'self', 'cls', 'state'}
     return False
 
 

@@ -156,7 +156,9 @@ def test_a_message_is_returned_itself():
 
 
 def test_a_right_message_of_any_type_is_not_changed():
-    for name in InterfaceCatalogue().names('msg', 'test_msgs'):
+    names = list(InterfaceCatalogue().names('msg', 'test_msgs'))
+    assert 'test_msgs/msg/Arrays' in names
+    for name in names:
         messages, originals = (get_test_msg(name.rpartition('/')[2]) for _ in range(2))
         assert messages
         for message, original in zip(messages, originals, strict=True):
