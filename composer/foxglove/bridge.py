@@ -28,7 +28,6 @@ from composer.interfaces.classes import interface_name
 from composer.recordings.definitions import ENCODING, full_definition, import_message
 from composer.recordings.system_recorder import SystemRecorder
 from composer.records import record
-from composer.runtime.messages.local_delivery import LocalTopics
 from composer.runtime.middleware.ros_graph import create_graph_node
 from composer.runtime.system_executor import SystemExecutor
 
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
 
     from composer.foxglove import BridgeOptions
     from composer.recordings.recorder import Entry, Log
+    from composer.runtime.messages.local_delivery import LocalTopics
 
 _LOOK_SEC: Final = 1.0
 _STOP_SEC: Final = 2.0
@@ -130,7 +130,7 @@ class FoxgloveBridge(GraphAccess):
         self._node = create_graph_node(context, '_composer_foxglove')
         self._executor.add_node(self._node)
         self._executor.start()
-        self._recorder.start(context, topics or LocalTopics(self._executor))
+        self._recorder.start(context, topics)
         self._thread.start()
         self._sender.start()
 

@@ -20,6 +20,7 @@ from foxglove.websocket import (
 )
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.exceptions import InvalidServiceNameException
 from rclpy.node import NodeNameNonExistentError
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
@@ -29,9 +30,10 @@ from composer.errors import CallTimeoutError
 from composer.interfaces.classes import import_interface
 from composer.names import join_names
 from composer.recordings.definitions import import_message
+from composer.runtime.messages.payload_texts import fit_value
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from foxglove.websocket import Client, ClientChannel, ServiceRequest, WebSocketServer
     from rclpy.node import Node
@@ -52,9 +54,7 @@ class GraphAccess(ServerListener):
 
     def __init__(self, *, allows_changes: bool) -> None:
         self._allows_changes = allows_changes
-        self._clients: dict[str, Any] = {}
         self._publishers: dict[tuple[int, int], Any] = {}
-        self._lock = threading.Lock()
         self._graph: Any = None
 
     def refuse(self, reason: str) -> None:
@@ -83,28 +83,40 @@ class GraphAccess(ServerListener):
             graph.set_advertised_service(service, nodes)
         self._server.publish_connection_graph(graph)
 
-    def _call_all(self, calls: Sequence[tuple[Any, str, Any]]) -> Iterator[Any]:
-        """Yield the response to each request, `None` if there is none in time.
+    def _call_all(self, calls: Sequence[tuple[Any, str, Any]]) -> list[Any]:
+        """Return the response to each request, `None` if there is none in time.
 
         Args:
             calls: The class of each service, its name, and the request.
         """
-        futures = []
+        clients: dict[str, Any] = {}
+        futures: list[Any] = []
+        responses = []
         deadline = monotonic() + _ANSWER_SEC
-        for service_class, name, _ in calls:
-            with self._lock:
-                if name not in self._clients:
-                    self._clients[name] = self._node.create_client(service_class, name)
-        for _, name, request in calls:
-            client = self._clients[name]
-            is_there = client.wait_for_service(max(0.0, deadline - monotonic()))
-            futures.append(client.call_async(request) if is_there else None)
-        for future in futures:
-            done = threading.Event()
-            if future is not None:
-                future.add_done_callback(lambda _, done=done: done.set())
-                done.wait(max(0.0, deadline - monotonic()))
-            yield future.result() if future is not None and future.done() else None
+        try:
+            for service_class, name, _ in calls:
+                # There is no service of a wrong name.
+                with suppress(InvalidServiceNameException):
+                    if name not in clients:
+                        clients[name] = self._node.create_client(service_class, name)
+            for _, name, request in calls:
+                client, left_sec = clients.get(name), max(0.0, deadline - monotonic())
+                if client is not None and client.wait_for_service(left_sec):
+                    futures.append(client.call_async(request))
+                else:
+                    futures.append(None)
+            for future in futures:
+                done = threading.Event()
+                if future is not None:
+                    future.add_done_callback(lambda _, done=done: done.set())
+                    done.wait(max(0.0, deadline - monotonic()))
+                is_done = future is not None and future.done()
+                responses.append(future.result() if is_done else None)
+        finally:
+            # The graph would have the services of nodes that have gone as long as the clients.
+            for client in clients.values():
+                self._node.destroy_client(client)
+        return responses
 
     def on_get_parameters(
         self, _client: Client, param_names: list[str], request_id: str | None = None
@@ -153,7 +165,13 @@ class GraphAccess(ServerListener):
             # Only parameters may have dots.
             node, _, name = parameter.name.partition('.')
             try:
-                ros = RosParameter(name, value=_fit(parameter, types)).to_parameter_msg()
+                value: Any = parameter.get_value()
+                if isinstance(value, bytes):
+                    value = [bytes([each]) for each in value]
+                value = fit_value(
+                    value, types.get(parameter.name, ParameterType.PARAMETER_NOT_SET)
+                )
+                ros = RosParameter(name, value=value).to_parameter_msg()
             except (AttributeError, TypeError, ValueError):
                 self.refuse(f'{parameter.name} was not set: it has no type of ROS')
                 continue
@@ -227,16 +245,3 @@ def _show(name: str, value: Any) -> Iterator[Parameter]:
         native = list(native)
     if native is not None:
         yield Parameter(name, value=native)
-
-
-def _fit(parameter: Parameter, types: Mapping[str, int]) -> Any:
-    """Return a value as the parameter has it: clients send whole numbers as integers."""
-    value: Any = parameter.get_value()
-    type_number = types.get(parameter.name)
-    if isinstance(value, bytes):
-        return [bytes([each]) for each in value]
-    if type_number == ParameterType.PARAMETER_DOUBLE and isinstance(value, int):
-        return float(value)
-    if type_number == ParameterType.PARAMETER_DOUBLE_ARRAY and isinstance(value, list):
-        return list(map(float, value))
-    return value

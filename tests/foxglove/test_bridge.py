@@ -6,7 +6,7 @@ import re
 import socket
 import struct
 import time
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 
 import pytest
 
@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 from composer.cli.main import run
 from composer.foxglove import BridgeOptions
 from composer.foxglove.bridge import FoxgloveBridge
-from tests.running import wait_for
+from tests.running import Peer, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -263,6 +263,21 @@ def test_clients_change_the_system_where_they_may(start):
         assert heard['/count'] == ['/hearer']
         assert served['/switch'] == ['/talker']
         assert published['/far'] == ['/far']
+
+
+def test_what_is_not_there_keeps_nothing_of_it_and_costs_no_other_parameter(
+    start, node, domain_id
+):
+    _, port = start()
+    with closing(Peer(domain_id)), connected(port) as one:
+        shown = one.parameters('/talker.mode', '/a b.c', '/peer.use_sim_time')
+        assert shown == {'/talker.mode': 'slow', '/peer.use_sim_time': False}
+
+    def services():
+        return [name for name, _ in node.get_service_names_and_types() if '/peer/' in name]
+
+    # A client of it would keep its services on the graph.
+    wait_for(lambda: not services(), 'the end of the node')
 
 
 def test_clients_change_nothing_otherwise(start):

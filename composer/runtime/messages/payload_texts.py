@@ -38,16 +38,20 @@ def read_parameter(name: str, text: str, parameter_type: int) -> Parameter:
     """
     from rclpy.parameter import Parameter
 
-    value = _parse(text)
-    if parameter_type == _DOUBLE and type(value) is int:
-        value = float(value)
-    elif parameter_type == _DOUBLES and isinstance(value, list):
-        value = [float(each) if type(each) is int else each for each in value]
     try:
-        return Parameter(name, value=value).to_parameter_msg()
+        return Parameter(name, value=fit_value(_parse(text), parameter_type)).to_parameter_msg()
     except (TypeError, ValueError, AssertionError):
         message = f'{text} is no value of a parameter'
         raise ComposerError(message) from None
+
+
+def fit_value(value: Any, parameter_type: int) -> Any:
+    """Return a value as a parameter of this type takes it: whole numbers may be floats."""
+    if parameter_type == _DOUBLE and type(value) is int:
+        return float(value)
+    if parameter_type == _DOUBLES and isinstance(value, list):
+        return [float(each) if type(each) is int else each for each in value]
+    return value
 
 
 def _parse(text: str) -> Any:
