@@ -48,7 +48,8 @@ def test_every_error_is_found_in_its_line_and_no_other_line(typed):
     assert {(each.span.source.name, each.span.line) for each in found} == wanted
     lines = (typed / 'driving.py').read_text().splitlines()
     number, line = next(each for each in enumerate(lines, start=1) if 'LONGEST' in each[1])
-    (finding,) = (each for each in found if each.span.line == number)
+    here = ('driving.py', number)
+    (finding,) = (each for each in found if (each.span.source.name, each.span.line) == here)
     assert finding.span.column == line.index('LONGEST') + 1
     assert finding.message.startswith("sensor_msgs/msg/LaserScan has no field 'LONGEST'")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import itertools
 import re
 import sys
 from dataclasses import replace
@@ -294,7 +295,9 @@ class TypeFindings:
                     return False
                 case ast.Call(func=inner) | ast.Attribute(value=inner):
                     value = inner
-                case ast.Subscript(value=inner) | ast.Await(value=inner):
+                case (
+                    ast.Subscript(value=inner) | ast.Await(value=inner) | ast.Starred(value=inner)
+                ):
                     value = inner
                 case _:
                     return False
@@ -358,7 +361,10 @@ class TypeFindings:
                 return None
             message = f"{method}() takes {wanted} as '{parameter}', got {self._shown(given)}"
             return value, 'bad-call', message, None
-        if package in {name.partition('.')[0] for name in self.modules}:
+        # Functions of the same module have no module before their names.
+        if function in self.defined or package in {
+            each.partition('.')[0] for each in self.modules
+        }:
             return None
         if given in self.nodes or (self.messages.get(given) and given not in self.own):
             what = 'a node' if given in self.nodes else self._shown(given)
@@ -707,18 +713,19 @@ def _is_made(imports: Mapping[str, str], value: ast.expr | None) -> bool:
         case ast.Call(func=ast.Name(id=name)):
             return bool(_INTERFACE.search(imports.get(name, '')))
         case ast.Call(func=ast.Attribute()) | ast.Attribute() | ast.BinOp():
-            return not words_in(value) & {'self', 'cls', 'state'}
+            return not words_in(value) & {'self', 'cls'}
     return False
 
 
 def _sources(place: ReportedPlace, name: str) -> list[ast.expr | None] | None:
     """Return what a name stands for where a report is; see `_stored`."""
-    for node, above in zip(place.around, [*place.around[1:], None], strict=True):
+    for index, node in enumerate(place.around):
         inner = [node]
         if isinstance(node, _COMPREHENSIONS):
             inner = [*node.generators]
-        elif isinstance(node, ast.Lambda) and above is not None:
-            inner = [above]
+        elif isinstance(node, ast.Lambda):
+            calls = (each for each in place.around[index:] if isinstance(each, ast.Call))
+            inner = [*itertools.islice(calls, 1)]
         elif not isinstance(node, ast.For) or len(_stored(node).get(name, ())) > 1:
             continue
         for each in inner:
@@ -731,7 +738,7 @@ def _sources(place: ReportedPlace, name: str) -> list[ast.expr | None] | None:
 
 
 def _stored(syntax: ast.AST) -> dict[str, list[ast.expr | None]]:
-    """Return what a function or a loop binds, by name: the value, or what it is one of.
+    """Return what a function or a loop binds, by name: the value, or, starred, what it is one of.
 
     `None` stands for what nothing shows. What is bound in an expression alone is left out.
     """
@@ -777,7 +784,7 @@ def _bindings(node: ast.AST) -> Iterator[tuple[ast.Name | ast.arg, ast.expr]]:
 
 
 def _taken(target: ast.expr, items: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
-    """Return the names of a loop with what their values are taken from."""
+    """Return the names of a loop with what their values are items of, starred."""
     match target, items:
         case ast.Tuple(elts=[_, inner]), ast.Call(func=ast.Name(id='enumerate'), args=[of, *_]):
             return _taken(inner, of)
@@ -787,9 +794,9 @@ def _taken(target: ast.expr, items: ast.expr) -> list[tuple[ast.expr, ast.expr]]
                 return [pair for name, of in pairs for pair in _taken(name, of)]
             return []
         case ast.Name(), ast.Call(func=ast.Name(id='reversed' | 'sorted' | 'list'), args=[of]):
-            return [(target, of)]
+            return [(target, ast.Starred(of))]
         case ast.Name(), _:
-            return [(target, items)]
+            return [(target, ast.Starred(items))]
     return []
 
 

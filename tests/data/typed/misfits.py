@@ -14,7 +14,13 @@ class Option:
         self.cost = cost
 
 
+def signal(level: str):
+    return level
+
+
 def follow(node, path):
+    # Python takes what annotations of its own functions do not.
+    signal(path)
     for pose in path.poses:
         node.logger.info(str(pose.psoe))  # error
     for pose in reversed(path.poses):
@@ -51,6 +57,7 @@ def steer(node, joy):
 
 
 def plan(node):
+    signal(node.parameters.speed)
     speed, frame = node.parameters.speed, node.parameters.frame
     node.logger.info('speed ' + node.parameters.speed)  # error
     node.logger.info(f'speed {speed}' + frame * 2)
