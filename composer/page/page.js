@@ -267,7 +267,8 @@ function restore() {
 
 function fold(part) {
   if (!folded.delete(part.id)) folded.add(part.id);
-  return draw(part.id);
+  chosen = tokens.get(part.id) ?? chosen;
+  return draw();
 }
 
 function foldAll() {
@@ -331,7 +332,9 @@ function makeSelectable(token, part) {
 let drag = null;
 stage.addEventListener('pointerdown', (event) => {
   if (event.button !== 0) return;
-  drag = {x: event.clientX, y: event.clientY, view, moved: false};
+  // The view may move below the pointer before it is lifted.
+  const part = parts.get(event.target.closest('.known')?.id)?.id;
+  drag = {x: event.clientX, y: event.clientY, view, moved: false, part};
 });
 stage.addEventListener('pointermove', (event) => {
   if (!drag) return;
@@ -343,8 +346,8 @@ stage.addEventListener('pointermove', (event) => {
   const scale = drag.view.width / Math.max(stage.clientWidth, 1);
   show({...drag.view, x: drag.view.x - across * scale, y: drag.view.y - down * scale});
 });
-stage.addEventListener('pointerup', (event) => {
-  if (drag && !drag.moved) press(event.target.closest('.known')?.id);
+stage.addEventListener('pointerup', () => {
+  if (drag && !drag.moved) press(tokens.get(drag.part));
   drag = null;
 });
 stage.addEventListener('pointercancel', () => { drag = null; });
@@ -418,12 +421,16 @@ async function get(path) {
 
 let asked = 0;
 
-async function draw(selected = parts.get(chosen)?.id ?? restore()) {
+async function draw(wanted) {
   const turn = ++asked;
+  const before = chosen;
+  let selected = wanted ?? parts.get(chosen)?.id ?? restore();
   const words = [...folded].map((id) => `folded=${encodeURIComponent(id)}`).join('&');
   const drawing = await get(`api/drawing?${words}`);
   // Who folds two boxes in a row sees the second drawing.
   if (turn !== asked) return;
+  // Who selects something else meanwhile keeps it.
+  if (chosen !== before) selected = parts.get(chosen)?.id;
   const hasFocus = svg.contains(document.activeElement);
   parts = new Map(Object.entries(drawing.parts ?? {}));
   findings = drawing.findings ?? [];

@@ -709,6 +709,20 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
     click('#isolation option[value=up]')
     wait_for(lambda: names_of('near') == upstream, 'what is upstream')
     assert browser.current_url.endswith('#topic%3A%2Fleft%2Fwords&isolate=up')
+    # What is clicked while a drawing comes stays selected.
+    browser.execute_script(
+        """const real = window.fetch;
+        window.fetch = (path, ...more) => (String(path).startsWith('api/drawing')
+            ? new Promise((come) => { window.comes = () => come(real(path, ...more)); })
+            : real(path, ...more));"""
+    )
+    click('#fold-all')
+    wait_for(lambda: browser.execute_script('return Boolean(window.comes)'), 'the question')
+    click('[aria-label="node /ear"] text')
+    wait_for(lambda: '#node%3A%2Fear' in browser.current_url, 'the selection')
+    browser.execute_script('window.comes()')
+    wait_for(lambda: find('main svg .folded'), 'the folded box')
+    assert '#node%3A%2Fear' in browser.current_url
 
 
 def test_a_browser_shows_it(page, acting, shared_compose, browser):
