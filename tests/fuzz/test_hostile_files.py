@@ -6,6 +6,7 @@ import re
 import resource
 import signal
 import sys
+import traceback
 from pathlib import Path
 
 import pytest
@@ -23,9 +24,14 @@ def run_limited(folder, words=('check', 'system.yaml'), memory=MEMORY_BYTES):
     output = folder / 'output.txt'
     child = os.fork()
     if not child:
-        with contextlib.suppress(BaseException):
+        try:
             _run_in_child(folder, output, words, memory)
-        os._exit(99)
+        except BaseException:  # noqa: BLE001 - the child must not go on as pytest
+            with contextlib.suppress(BaseException):
+                traceback.print_exc()
+                sys.stderr.flush()
+        finally:
+            os._exit(99)
     _, status = os.waitpid(child, 0)
     return os.waitstatus_to_exitcode(status), output.read_text(errors='replace')
 
