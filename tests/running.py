@@ -118,6 +118,8 @@ class Child:
             'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]),
         }
         self.lines = []
+        # Of other commands nobody waits for that.
+        self._up = str(arguments[0]) != 'up'
         self._grown = threading.Condition()
         self._ended = False
         self._process = start_composer(map(str, arguments), folder, environment)
@@ -162,8 +164,13 @@ class Child:
         self._reader.join(DEADLINE_SEC)
         return code
 
-    def stop(self, number=signal.SIGINT):
-        """Send a signal and return the exit code."""
+    def stop(self, number=signal.SIGINT, *, once_up=True):
+        """Send a signal, to a system once it is up, and return the exit code."""
+        with self._grown:
+            if not self._grown.wait_for(
+                lambda: self._up or self._ended or not once_up, DEADLINE_SEC
+            ):
+                pytest.fail(f'it was not up in time; the output was\n{self.output}')
         self.send(number)
         return self.wait()
 
@@ -180,6 +187,7 @@ class Child:
         for line in self._process.stdout:
             with self._grown:
                 self.lines.append(line.rstrip('\n'))
+                self._up = self._up or ' ready in ' in line
                 self._grown.notify_all()
         with self._grown:
             self._ended = True

@@ -77,6 +77,7 @@ def said_by(child, node):
 
 def test_add_two_ints_server_answers_an_external_client(up, peers):
     child = up('add_two_ints_server')
+    child.wait_until_ready()
     assert peers.ask('ask_for_sum', 'add_two_ints', 2, 3) == 5
     assert peers.ask('ask_for_sum', 'add_two_ints', -7, 2**40) == 2**40 - 7
 
@@ -116,6 +117,7 @@ def test_add_two_ints_client_takes_names_and_negative_numbers(up, peers):
 
 def test_fibonacci_server_gives_an_external_client_feedback_and_the_sequence(up, peers):
     child = up('fibonacci_server')
+    child.wait_until_ready()
     outcome = peers.ask('send_goal', 3)
 
     assert outcome == {
@@ -134,6 +136,7 @@ def test_fibonacci_server_gives_an_external_client_feedback_and_the_sequence(up,
 
 def test_fibonacci_server_stops_when_an_external_client_cancels(up, peers):
     child = up('fibonacci_server')
+    child.wait_until_ready()
     outcome = peers.ask('send_goal', 40, 'cancel')
 
     assert outcome['status'] == CANCELED
@@ -173,6 +176,7 @@ def test_fibonacci_client_says_that_it_was_refused(up, peers):
 
 def test_calculator_server_does_what_its_parameter_says(up, peers):
     child = up('calculator_server')
+    child.wait_until_ready()
     assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 15
     assert peers.ask('set_operation', 'subtract') == [True, '']
     assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 5

@@ -109,7 +109,7 @@ def test_an_interrupt_ends_what_has_not_come_up(compose, wait_for):
         return [each.read_text() for each in (compose.folder / 'log').glob('composer_*')]
 
     wait_for(lambda: any('logged never' in text for text in said()), 'its start')
-    assert child.stop() == 130
+    assert child.stop(once_up=False) == 130
     assert run(['down', '--timeout', '1']) == 1
 
 

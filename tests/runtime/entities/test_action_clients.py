@@ -1,6 +1,5 @@
 """Goals that behaviours send, to a server of this process and to a plain one."""
 
-import signal
 import threading
 import time
 from contextlib import suppress
@@ -326,6 +325,6 @@ def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
 def check_that_a_signal_ends_it(child, waiting=1, code=0):
     child.wait_for_line('waiting', times=waiting)
 
-    assert child.stop(signal.SIGINT) == code, child.output
+    assert child.stop(once_up=not code) == code, child.output
     assert 'rror' not in child.output
     assert 'did not end' not in child.output

@@ -175,7 +175,7 @@ def test_a_stop_does_not_wait_for_a_slow_component(compose):
     child = compose(system(containers, {'n': {}}))
     child.wait_for_line("Waiting for the container '/perception' to load 'it'…")
 
-    assert child.stop() == 130
+    assert child.stop(once_up=False) == 130
 
 
 def test_a_container_that_ends_while_it_loads_gets_all_again(compose, listed):

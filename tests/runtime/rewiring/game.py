@@ -73,15 +73,10 @@ class Game:
         self._old = self._system.snapshot
         self._plan = None
         with self._failing(done):
-            outcome = self._reloader.reload(self._system)
-        text = outcome.text.splitlines()[-1]
-        assert not self._system.stop_requested, done
-        for each in self._processes():
-            each.create_parameter_services()
+            outcome, text = self._reload(done)
         if FAULT in text:
             self._check_refused(done, text)
-            outcome = self._reloader.reload(self._system)
-            text = outcome.text.splitlines()[-1]
+            outcome, text = self._reload(done)
         if not outcome.succeeded:
             if self._plan is not None and not any(each in text for each in _OWN_REASONS):
                 self._fresh.begin(checks=True)
@@ -118,6 +113,13 @@ class Game:
         self.applied += bool(plan)
         self._project.keep()
         return done, text
+
+    def _reload(self, done):
+        outcome = self._reloader.reload(self._system)
+        assert not self._system.stop_requested, done
+        for each in self._processes():
+            each.create_parameter_services()
+        return outcome, outcome.text.splitlines()[-1]
 
     def _processes(self):
         """Return what looks into each process, that of the system first."""
