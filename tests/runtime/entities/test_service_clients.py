@@ -1,6 +1,5 @@
 """Calls of services from behaviours: of this process and of others, one and thousands."""
 
-
 import pytest
 
 pytest.importorskip('rclpy')
