@@ -191,10 +191,10 @@ class Game:
         assert not lost, f'{done} changed also {lost}'
         touched = {each.target for each in operations if each.action is not Action.CHANGE}
         nodes = {target[0] for target in touched if target[1] == 'nodes'}
-        # Their subscriptions to `/clock` come and go.
+        # Their subscriptions to `/clock` come and go, also where the edit is taken back.
         timed = {
             each.target[0]
-            for each in operations
+            for each in (self._plan.operations if self._plan else ())
             if 'use_sim_time' in {change.key for change in each.changes}
         }
         changed = {target[:2] for target in touched}
@@ -203,7 +203,7 @@ class Game:
             if node not in nodes and (node, kind) not in changed and topic[0] != '_':
                 if topic == '/clock' and node in timed:
                     continue
-                if topic in _OF_NODES or '/_action/' in topic:
+                if topic in _OF_NODES or '/_action/' in topic or '/_service_event' in topic:
                     continue
                 assert now.get((node, kind, topic)) == gids, (done, node, kind, topic)
 

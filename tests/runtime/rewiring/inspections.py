@@ -80,6 +80,8 @@ class Inspection:
         if name is None or node.ros._descriptors[name].read_only:
             return None
         (result,) = node.ros.set_parameters([Parameter(name, value=value)])
+        # A whole number becomes a float where the parameter is one.
+        value = node.ros.get_parameter(name).value
         return (node.full_name, name, repr(value)) if result.successful else None
 
     def fail_at(self, number):
