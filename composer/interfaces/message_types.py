@@ -40,18 +40,15 @@ class MessageTypes:
         """Return whether a message may have a constant of this name."""
         if name.endswith('__DEFAULT'):
             return True
-        description = self.describe(type_name)
-        if description is None or any(each.name == name for each in description.constants):
+        if self.describe(type_name) is None or name in (known := self.constants(type_name)):
             return True
-        names = self.catalogue.constant_names(split_part(type_name)[0])
         # A description without any may come without those that there are.
-        return name in names if names is not None else not description.constants
+        return not (known or self.catalogue.knows_constants(split_part(type_name)[0]))
 
     def constants(self, type_name: str) -> list[str]:
         """Return the names of the constants that are known."""
         description = self.describe(type_name)
-        own = [each.name for each in description.constants] if description else []
-        return [*own, *sorted(self.catalogue.constant_names(split_part(type_name)[0]) or ())]
+        return sorted(each.name for each in description.constants) if description else []
 
     def are_alike(self, one: str, other: str) -> bool:
         """Return whether two types are the same for a behaviour.

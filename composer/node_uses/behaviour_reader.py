@@ -22,13 +22,9 @@ from composer.node_uses.reading import (
 from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
 from composer.node_uses.walk import TooLongError, Walk
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.modules import FunctionSource, ModuleSource
+from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import ends_without_value, never_returns
-from composer.python_source.syntax import (
-    list_children,
-    own_nodes,
-    positional_names,
-)
+from composer.python_source.syntax import FUNCTIONS, list_children, own_nodes
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -50,7 +46,7 @@ _ANSWERS: dict[str, tuple[set[type], str]] = {
     'on_parameters': ({str, type(None)}, 'None, or why not'),
 }
 
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+_FUNCTIONS = (*FUNCTIONS, ast.Lambda)
 
 
 @dataclass(slots=True)
@@ -128,7 +124,7 @@ class BehaviourReader:
         walk = Walk(self._names, self._followed)
         try:
             given = self._given(function, binding)
-            walk.enter(function, given, is_waited=True)
+            walk.enter(function, {**given}, is_waited=True, is_call=False)
             _Results(walk, function, given, binding, wire).note()
             if len(given) < len(binding.parameters):
                 walk.run.reading.open_all()
@@ -150,14 +146,13 @@ class BehaviourReader:
     def _object_of(self, of: Class) -> Instance:
         """Return the object that the node has of a class: it is made with the node."""
         init = self._names.attribute(Instance(of), '__init__')
-        names = positional_names(init.definition)[1:2] if isinstance(init, Function) else []
+        names = init.parameters[:1] if isinstance(init, Function) else []
         return Instance(of, tuple((name, Chain(('node',))) for name in names))
 
     def _given(self, function: Function, binding: Binding) -> dict[str, Value]:
-        names = positional_names(function.definition)[1 if function.bound is not None else 0 :]
         second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
         values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
-        return dict(zip(names, values, strict=False))
+        return dict(zip(function.parameters, values, strict=False))
 
 
 @record
@@ -175,7 +170,7 @@ class _Results:
         definition = self.function.definition
         if isinstance(definition, ast.Lambda):
             return FunctionKind.PLAIN
-        return FunctionSource(definition).kind
+        return self.walk.run.names.kind_of(definition)
 
     @cached_property
     def scope(self) -> Scope:
@@ -210,7 +205,7 @@ class _Results:
         names = self.walk.run.names
         init = names.attribute(bound, '__init__')
         if isinstance(bound, Instance) and isinstance(init, Function):
-            self.walk.enter(init, dict(bound.given), is_waited=True)
+            self.walk.enter(init, {**dict(bound.given)}, is_waited=True, is_call=False)
 
     def _note_payload(self, value: ast.expr, key: str) -> None:
         module = self.function.module

@@ -18,14 +18,15 @@ from composer.node_uses.values import (
     Scope,
     Texts,
     Value,
+    only_text,
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.modules import MOST_BASES, FunctionSource, ModuleSource
 from composer.python_source.syntax import (
+    FUNCTIONS,
     FunctionNode,
     bound_names,
     imported_names,
-    list_arguments,
     own_nodes,
     positional_names,
 )
@@ -45,7 +46,6 @@ _MADE = frozenset(
     }
 )
 _INSTALLED = {'site-packages', 'dist-packages'}
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
 _Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
 # Longer ways from a name to its value are not followed.
@@ -125,10 +125,8 @@ class Names:
     def is_local(self, name: str, scope: Scope) -> bool:
         """Return whether a name is one of a function."""
         definition = scope.definition
-        if definition is None:
-            return False
-        arguments = {each.arg for each in list_arguments(definition.args)}
-        return name in arguments or name in self.stored_in(definition)
+        is_stored = definition is not None and name in self.stored_in(definition)
+        return is_stored or name in scope.arguments
 
     # Expressions
 
@@ -168,7 +166,7 @@ class Names:
                 return self._stored_value(stored, within)
             if name in within.given:
                 return within.given[name]
-            if name in {each.arg for each in list_arguments(within.definition.args)}:
+            if name in within.arguments:
                 return None
             within = within.outer
         return self.top_value(scope.module, name)
@@ -176,14 +174,14 @@ class Names:
     def stored_in(self, definition: ast.AST) -> dict[str, list[_Stored]]:
         """Return the names that a function stores, and what it assigns to each."""
         if id(definition) not in self._stored:
-            self._stored[id(definition)] = _find_stored(definition)
+            self._stored[id(definition)] = find_stored(definition)
         return self._stored[id(definition)]
 
     def _stored_value(self, stored: list[_Stored], scope: Scope) -> Value | None:
         expression, is_item = stored[0]
         if len(stored) > 1 or expression is None:
             return None
-        if isinstance(expression, _FUNCTIONS):
+        if isinstance(expression, FUNCTIONS):
             is_plain = not expression.decorator_list
             return Function(scope.module, expression, None, scope) if is_plain else None
         if not is_item:
@@ -315,20 +313,18 @@ class Names:
         init = self._attribute_of(of, '__init__', Instance(of))
         if not isinstance(init, Function) or call is None:
             return Instance(of)
-        return Instance(of, tuple(self.bind(init, call, scope).items()))
+        bound = self.bind(init, call, scope).items()
+        return Instance(of, tuple((name, value) for name, value in bound if value is not None))
 
-    def bind(self, function: Function, call: ast.Call, scope: Scope) -> dict[str, Value]:
+    def bind(self, function: Function, call: ast.Call, scope: Scope) -> dict[str, Value | None]:
         """Return what the parameters of a function stand for in a call, without its `self`."""
-        names = positional_names(function.definition)
-        names = names[1:] if function.bound is not None else names
         pairs: list[tuple[str, ast.expr]] = []
-        for name, value in zip(names, call.args, strict=False):
+        for name, value in zip(function.parameters, call.args, strict=False):
             if isinstance(value, ast.Starred):
                 break
             pairs.append((name, value))
         pairs += [(each.arg, each.value) for each in call.keywords if each.arg]
-        values = ((name, self.value_of(node, scope)) for name, node in pairs)
-        return {name: value for name, value in values if value is not None}
+        return {name: self.value_of(node, scope) for name, node in pairs}
 
     def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
         match self.value_of(call.func, scope):
@@ -340,14 +336,15 @@ class Names:
                 return self.instance_of(of, call, scope)
             case Chain(path=('node', 'send_goal')):
                 sent = self.value_of(call.args[0], scope) if call.args else None
-                if isinstance(sent, Texts) and len(sent.options) == 1:
-                    return Chain(('goal', sent.options[0][0]))
+                client = only_text(sent)
+                return None if client is None else Chain(('goal', client))
             case Chain(path=('node', 'with_own_state')):
                 return Chain(('node',))
         return None
 
 
-def _find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
+def find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
+    """Return the names that a function stores, and what it assigns to each."""
     nodes = list(own_nodes(definition))
     found: dict[str, list[_Stored]] = {}
     shown: set[int] = set()
@@ -359,7 +356,7 @@ def _find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
                 shown.add(id(target))
                 found.setdefault(target.id, []).append((value, is_item))
     for node in nodes:
-        function = node if isinstance(node, _FUNCTIONS) else None
+        function = node if isinstance(node, FUNCTIONS) else None
         for name in bound_names(node) if id(node) not in shown else ():
             found.setdefault(name, []).append((function, False))
     return {name: several for name, several in found.items() if name not in shared}

@@ -15,7 +15,7 @@ from composer.node_uses.reading import (
     Payload,
     RemoteParameter,
 )
-from composer.node_uses.values import Chain, External, Function, Texts
+from composer.node_uses.values import Chain, External, Function, Texts, only_text
 from composer.python_source.modules import read_signature
 from composer.schema.structure import find_problem
 
@@ -75,7 +75,7 @@ def signature_of(method: str) -> inspect.Signature:
 
 def explain_misfit(signature: inspect.Signature, call: ast.Call) -> str | None:
     """Return why a function cannot be called so, `None` if it can."""
-    if _is_open(call):
+    if is_open(call):
         return None
     try:
         signature.bind(*call.args, **{each.arg or '': each.value for each in call.keywords})
@@ -96,7 +96,7 @@ def note_call(
         run.report('bad-call', scope.module, call, text, None)
         if method in CREATING_METHODS:
             return
-    if misfit is not None or _is_open(call):
+    if misfit is not None or is_open(call):
         run.escape(Chain(('node', method)))
         return
     keywords = {each.arg or '': each.value for each in call.keywords}
@@ -111,7 +111,8 @@ def note_call(
         _note_remote(run, arguments, scope)
 
 
-def _is_open(call: ast.Call) -> bool:
+def is_open(call: ast.Call) -> bool:
+    """Return whether a call has arguments that are not written out: `*args`, `**options`."""
     is_starred = any(isinstance(each, ast.Starred) for each in call.args)
     return is_starred or any(each.arg is None for each in call.keywords)
 
@@ -120,17 +121,16 @@ def _note_sent(
     run: Run, method: str, arguments: Mapping[str, ast.expr], scope: Scope, *, is_awaited: bool
 ) -> None:
     kind = SENDING_METHODS[method]
-    name = run.names.value_of(arguments['name'], scope)
+    named = run.names.value_of(arguments['name'], scope)
     is_wait = method in ('call', 'send_goal') or (method == 'call_async' and is_awaited)
     waits: Waited = 'answer' if is_wait and scope.waits and not run.doubts else ''
-    run.use(kind, name, waits=waits)
-    payload = arguments.get('payload')
+    run.use(kind, named, waits=waits)
+    payload, name = arguments.get('payload'), only_text(named)
     is_none = isinstance(payload, ast.Constant) and payload.value is None
-    is_known = isinstance(name, Texts) and len(name.options) == 1 and not (run.guards or run.fixed)
-    if payload is not None and is_known and not (is_none and method != 'publish'):
-        section, text = KIND_OF_NOUN[kind].section, name.options[0][0]  # type: ignore[union-attr]
-        part, is_certain = _PARTS[method], run.is_certain
-        sent = Payload(section, text, part, payload, scope.module, is_certain)
+    is_known = name is not None and not (run.guards or run.fixed)
+    if payload is not None and name and is_known and not (is_none and method != 'publish'):
+        section, part = KIND_OF_NOUN[kind].section, _PARTS[method]
+        sent = Payload(section, name, part, payload, scope.module, run.is_certain)
         run.reading.payloads.append(sent)
 
 
@@ -153,8 +153,8 @@ def _note_created(
     if of_type is not None and channel is not None:
         type_name = _type_named(run, of_type, scope)
         place = scope.module.span_of(of_type)
-        text = _only_text(run.names.value_of(channel, scope))
-        name = _only_text(run.names.value_of(arguments.get('name', channel), scope))
+        text = only_text(run.names.value_of(channel, scope))
+        name = only_text(run.names.value_of(arguments.get('name', channel), scope))
         run.reading.created.append(CreatedEntity(noun, name, text, type_name, place))
     if 'publish' in arguments:
         run.use('publisher', run.names.value_of(arguments['publish'], scope))
@@ -190,12 +190,7 @@ def _type_named(run: Run, node: ast.expr, scope: Scope) -> str | None:
     if isinstance(value, External):
         parts = value.name.split('.')
         return '/'.join(parts) if parts[-2:-1] and parts[-2] in ('msg', 'srv', 'action') else None
-    return _only_text(value)
-
-
-def _only_text(value: Value | None) -> str | None:
-    is_one = isinstance(value, Texts) and len(value.options) == 1
-    return value.options[0][0] if is_one else None  # type: ignore[union-attr]
+    return only_text(value)
 
 
 def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> None:

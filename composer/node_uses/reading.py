@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Related, Span
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
+    from composer.node_uses.values import Value
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.
@@ -221,6 +222,15 @@ class MessageUse:
     value: ast.expr | None = None
 
 
+@record
+class Passed:
+    """What a function of the project is given; `None` for something that is not known."""
+
+    definition: ast.AST
+    given: dict[str, Value | None]
+    is_call: bool
+
+
 @dataclass(slots=True)
 class Reading:
     """All that is known of what a behaviour does.
@@ -249,6 +259,7 @@ class Reading:
         payloads: What it sends, yields and returns, as it is written.
         message_uses: What it reads and writes of the message.
         values_needed: The parameters and states that have to have a value, and where.
+        passed: What the functions are given that it runs.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -274,6 +285,7 @@ class Reading:
     payloads: list[Payload] = field(default_factory=list)
     message_uses: list[MessageUse] = field(default_factory=list)
     values_needed: list[NeededValue] = field(default_factory=list)
+    passed: list[Passed] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
+from composer.python_source.syntax import list_arguments, positional_names
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -30,6 +32,11 @@ class Texts:
 
     options: tuple[tuple[str, ast.expr, ModuleSource], ...]
 
+    @property
+    def all(self) -> set[str]:
+        """The texts alone."""
+        return {text for text, _, _ in self.options}
+
 
 @record
 class Function:
@@ -39,6 +46,11 @@ class Function:
     definition: FunctionNode | ast.Lambda
     bound: Value | None = None
     scope: Scope | None = None
+
+    @property
+    def parameters(self) -> list[str]:
+        """The names of those that a call gives by their positions."""
+        return positional_names(self.definition)[self.bound is not None :]
 
 
 @record
@@ -80,6 +92,12 @@ class Made:
     node: ast.expr
 
 
+def only_text(value: Value | None) -> str | None:
+    """Return the text that a value is, if it is one, and no other one."""
+    is_one = isinstance(value, Texts) and len(value.options) == 1
+    return value.options[0][0] if is_one else None  # type: ignore[union-attr]
+
+
 Value: TypeAlias = Chain | Texts | Function | Class | Instance | Module | External | Made
 
 
@@ -107,3 +125,9 @@ class Scope:
         self.given = given or {}
         self.outer = outer
         self.waits = waits
+
+    @cached_property
+    def arguments(self) -> frozenset[str]:
+        """The names of all that the function takes."""
+        arguments = list_arguments(self.definition.args) if self.definition else ()
+        return frozenset(each.arg for each in arguments)

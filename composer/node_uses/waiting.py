@@ -121,15 +121,13 @@ def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
     """Return what is assigned to a name, where it is assigned once."""
     if not isinstance(node, ast.Name):
         return node
-    stored = run.names.stored_in(scope.definition).get(node.id) if scope.definition else None
-    if stored is not None:
-        match stored:
-            case [(ast.expr() as value, False)]:
-                return value
-    elif node.id not in scope.module.top.stored_again:
-        match scope.module.top.statements.get(node.id):
-            case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
-                return value
+    if run.names.is_local(node.id, scope):
+        value = run.names.alias_of(node.id, scope)
+        return value if isinstance(value, ast.expr) else node
+    top = scope.module.top
+    match top.statements.get(node.id) if node.id not in top.stored_again else None:
+        case [(ast.Assign(targets=[ast.Name()], value=value), False)]:
+            return value
     return node
 
 

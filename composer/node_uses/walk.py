@@ -5,13 +5,21 @@ from __future__ import annotations
 import ast
 import importlib.util
 from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
-from composer.node_uses.reading import Awaited, MessageUse, NeededValue, Payload, StateUse
+from composer.node_uses.reading import (
+    Awaited,
+    MessageUse,
+    NeededValue,
+    Passed,
+    Payload,
+    StateUse,
+)
 from composer.node_uses.values import (
     Chain,
     Class,
@@ -26,7 +34,7 @@ from composer.node_uses.values import (
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import read_signature
-from composer.python_source.syntax import list_arguments, list_children, positional_names, words_in
+from composer.python_source.syntax import list_arguments, list_children, stored_names, words_in
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -40,7 +48,6 @@ _DEEPEST = 5
 _MOST_STEPS = 30_000
 # Those of all behaviours that are read together.
 _MOST_STEPS_IN_ALL = 600_000
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _TESTS = frozenset(
     {'callable', 'get_fields_and_field_types', 'getattr', 'hasattr', 'isinstance', 'type'}
 )
@@ -128,12 +135,21 @@ class Walk:
 
     # Functions
 
-    def enter(self, function: Function, given: dict[str, Value], *, is_waited: bool) -> None:
-        """Walk through a function that is called."""
+    def enter(
+        self,
+        function: Function,
+        passed: dict[str, Value | None],
+        *,
+        is_waited: bool,
+        is_call: bool = True,
+    ) -> None:
+        """Walk through a function that Composer calls, or this code."""
         definition, run = function.definition, self.run
+        run.reading.passed.append(Passed(definition, passed, is_call))
+        given = {name: value for name, value in passed.items() if value is not None}
         arguments = [each.arg for each in list_arguments(definition.args)]
         if function.bound is not None and arguments:
-            given = {**given, arguments[0]: function.bound}
+            given[arguments[0]] = function.bound
         key = (
             *(id(definition), is_waited, frozenset(given.items()), run.is_certain, run.doubts > 0),
             *(run.guards > 0, tuple(lock for lock, _ in run.held_locks)),
@@ -186,17 +202,15 @@ class Walk:
             else:
                 self._note_read(value, node, scope)
         self.run.calls.append(scope.module.span_of(call))
+        if node_calls.is_open(call):
+            given = {**dict.fromkeys(function.parameters), **given}
         self.enter(function, given, is_waited=is_waited and scope.waits)
         self.run.calls.pop()
 
     def _hand_on(self, function: Function, given: Sequence[Value | None]) -> None:
         """Walk through a function that something may call later, with these arguments first."""
-        definition = function.definition
-        names = positional_names(definition)[1 if function.bound is not None else 0 :]
-        pairs = zip(names, given, strict=False)
-        self.enter(
-            function, {name: value for name, value in pairs if value is not None}, is_waited=False
-        )
+        names = function.parameters
+        self.enter(function, dict(zip_longest(names, given[: len(names)])), is_waited=False)
 
     # Statements
 
@@ -249,11 +263,7 @@ class Walk:
                         self.visit(child, scope)
 
     def _note_globals(self, names: Sequence[str], scope: Scope) -> None:
-        stored = {
-            each.id
-            for each in ast.walk(scope.definition or ast.Pass())
-            if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
-        }
+        stored = stored_names(scope.definition or ast.Pass())
         for name in names:
             what = waiting.global_name(self.run, name, scope)
             if what is not None and name in stored:
@@ -461,7 +471,7 @@ class Walk:
         while within is not None and within.definition is not None:
             if name in self._names.stored_in(within.definition):
                 return False
-            if name in {each.arg for each in list_arguments(within.definition.args)}:
+            if name in within.arguments:
                 return not isinstance(within.given.get(name), Chain | Instance | Class)
             within = within.outer
         return False
@@ -601,7 +611,7 @@ class Walk:
                 if not isinstance(named, Texts):
                     self.run.reading.is_own_state_open = True
                 elif is_stored:
-                    self.run.reading.own_state_set |= {text for text, _, _ in named.options}
+                    self.run.reading.own_state_set |= named.all
                 else:
                     self._read_own_state(key, scope)
             case Chain(path=('node', 'state')):
@@ -630,7 +640,7 @@ class Walk:
                         self.run.ask('parameter', named, is_change=is_change)
                         operands = [node.left]
                     case Chain(path=('node', 'own_state')) if isinstance(named, Texts):
-                        self.run.reading.own_state_set |= {text for text, _, _ in named.options}
+                        self.run.reading.own_state_set |= named.all
                         operands = [node.left]
             case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE()]):
                 for operand in operands:
@@ -938,7 +948,7 @@ class Walk:
         elif method in ('get', 'setdefault', 'pop') and isinstance(named, Texts):
             if method == 'pop' and len(call.args) == 1:
                 self._read_own_state(call.args[0], scope)
-            reading.own_state_set |= {text for text, _, _ in named.options}
+            reading.own_state_set |= named.all
         elif method in ('get', 'setdefault', 'pop'):
             reading.is_own_state_open = True
 
@@ -947,13 +957,13 @@ class Walk:
         if len(call.args) < 2:  # noqa: PLR2004 (the object and the name)
             return False
         owner, named = (self._names.value_of(each, scope) for each in call.args[:2])
-        texts = [text for text, _, _ in named.options] if isinstance(named, Texts) else None
+        texts = named.all if isinstance(named, Texts) else None
         run = self.run
         match owner:
             case Chain(path=('node', 'parameters')):
                 run.ask('parameter', named)
             case Chain(path=('node', 'state')) if texts is not None:
-                run.reading.state_tested |= set(texts)
+                run.reading.state_tested |= texts
                 for text in texts if function.endswith('setattr') else ():
                     run.set_state(text, scope, call)
             case Chain(path=('node', 'state')):

@@ -7,10 +7,10 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from composer.python_source.annotations import dotted_name
-from composer.python_source.syntax import positional_names
+from composer.python_source.syntax import own_nodes, positional_names, stored_names
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from composer.python_source.syntax import FunctionNode
 
@@ -44,17 +44,16 @@ def always_answers(function: FunctionNode) -> bool:
     The second parameter, a message, is such a value, and so are its fields.
     """
     message = _message_of(function)
-    sure = set() if message in _stored_in(function) else {message}
-    answers = [statement.value for statement in _returns(function)]
+    sure = set() if message in stored_names(function) else {message}
     raises = any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function))
     ends = not raises and _ends(function)
-    return ends and all(_is_value(answer, sure) for answer in answers)
+    return ends and all(_is_value(each.value, sure) for each in _returns(function))
 
 
 def passes_message_on(function: FunctionNode) -> bool:
     """Return whether a function returns its second parameter, a message, as it is."""
     message = _message_of(function)
-    if not message or message in _stored_in(function):
+    if not message or message in stored_names(function):
         return False
     return any(_may_be(answer.value, message) for answer in _returns(function))
 
@@ -63,25 +62,14 @@ def _message_of(function: FunctionNode) -> str:
     return next(iter(positional_names(function)[1:]), '')
 
 
-def _stored_in(node: ast.AST) -> set[str]:
-    names = [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
-    return {name.id for name in names if not isinstance(name.ctx, ast.Load)}
-
-
 def _may_be(answer: ast.expr | None, name: str) -> bool:
     if isinstance(answer, ast.IfExp):
         return _may_be(answer.body, name) or _may_be(answer.orelse, name)
     return isinstance(answer, ast.Name) and answer.id == name
 
 
-def _returns(function: FunctionNode) -> Iterator[ast.Return]:
-    pending: list[ast.AST] = list(function.body)
-    while pending:
-        node = pending.pop()
-        if isinstance(node, ast.Return):
-            yield node
-        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
-            pending.extend(ast.iter_child_nodes(node))
+def _returns(function: FunctionNode) -> list[ast.Return]:
+    return [node for node in own_nodes(function) if isinstance(node, ast.Return)]
 
 
 def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
@@ -164,7 +152,7 @@ class _Ways:
         for node in ast.walk(function) if is_certain else ():
             if isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) and node.value:
                 subjects = self._subjects(node.value)
-                for name in _stored_in(node):
+                for name in stored_names(node):
                     self._sources.setdefault(name, set()).update(subjects)
 
     def follow(self, block: list[ast.stmt], tested: _Tested) -> _Tested:
@@ -244,7 +232,7 @@ class _Ways:
         before = self._continued, self._broken
         self._continued, self._broken = [], []
         # Which round is the last may be tested by what the loop stores.
-        stored = _stored_in(node)
+        stored = stored_names(node)
         body = self.follow(node.body, tested | self._subjects(source) | stored)
         body, broken = _join(body, *self._continued), self._broken
         self._continued, self._broken = before

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 _TOKEN = re.compile(rb'\w+|[^\w ]')
 # The compiler compares those of one scope with each other: ten thousand equal ones take seconds.
@@ -24,7 +25,7 @@ _MOST_CODE_OBJECTS = 4000
 _MOST_COPIED_CHARACTERS = 200_000
 _CHARACTERS_OF_LINE = 40
 _WAYS_OUT = (ast.Return, ast.Break, ast.Continue)
-SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+SCOPES = (*FUNCTIONS, ast.ClassDef, ast.Lambda)
 # The fields of statements that hold others.
 BLOCKS = ('body', 'handlers', 'cases', 'orelse', 'finalbody')
 
@@ -80,6 +81,12 @@ def bound_names(node: ast.AST) -> list[str]:
         case ast.Import() | ast.ImportFrom():
             return [name for name, _ in imported_names(node)]
     return []
+
+
+def stored_names(node: ast.AST) -> set[str]:
+    """Return the names that code assigns or deletes, in functions in it as well."""
+    names = [each for each in ast.walk(node) if isinstance(each, ast.Name)]
+    return {name.id for name in names if not isinstance(name.ctx, ast.Load)}
 
 
 def imported_names(

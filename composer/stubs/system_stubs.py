@@ -53,7 +53,7 @@ def write_messages(
     for module in modules.values():
         packages |= {name.partition('.')[0] for name in module.imports}
     packages &= {*context.catalogue.packages()}
-    stubs = write_packages(sorted(packages), context.interfaces)
+    stubs = write_packages(sorted(packages), context.catalogue)
     yield from ((path, text_of(lines)) for path, lines in stubs)
 
 

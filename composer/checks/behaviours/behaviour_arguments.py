@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.transforms import is_shipped
 from composer.python_source.modules import ModuleSource
-from composer.python_source.syntax import positional_names
+from composer.python_source.syntax import positional_names, stored_names
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -65,8 +65,7 @@ def _is_known(context: CheckContext, parameter: ParameterSpec) -> bool:
 
 def _compared_pairs(function: FunctionNode) -> set[tuple[str, str]]:
     """Return the parameters of a function that it compares with parameters of its node."""
-    names = [node for node in ast.walk(function) if isinstance(node, ast.Name)]
-    stored = {name.id for name in names if not isinstance(name.ctx, ast.Load)}
+    stored = stored_names(function)
     own = {*positional_names(function)[:1]} - stored
     pairs: set[tuple[str, str]] = set()
     for node in ast.walk(function):

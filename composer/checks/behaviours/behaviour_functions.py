@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import sys
 from typing import TYPE_CHECKING, Any, get_args
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from composer.diagnostics import Related, diagnostic_at
 from composer.language.includes.include_entry import shown_path
 from composer.python_source.module_finder import MissingModule
+from composer.python_source.syntax import FUNCTIONS
 from composer.python_source.value_annotations import find_wanted_values
 from composer.spelling import did_you_mean, find_nearest, suggest
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from composer.python_source.function_kinds import FunctionKind
     from composer.python_source.modules import ModuleSource
 
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 # Modules of the standard library with functions that take anything, such as `print`.
 _TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'unittest')
 
@@ -162,7 +161,7 @@ def _explain_missing_function(
     if of is not None:
         part = behaviour.method_name
         text = f"the class '{behaviour.class_name}' has no method '{part}'"
-        names = [node.name for node in of.body if isinstance(node, _FUNCTIONS)]
+        names = [node.name for node in of.body if isinstance(node, FUNCTIONS)]
         names = [name for name in names if name[0] != '_']
         advice = suggest(part, names, 'it has', 'it has no methods')
     elif behaviour.class_name:

@@ -48,8 +48,8 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         ]
         for name, node in context.spec.nodes.items()
     }
-    yield from _check_names(context, uses)
     lost, unused = _lost_by_node(context), context.system.unused
+    yield from _check_names(context, uses, lost)
     partial = unused.nodes if unused else {}
     whole = [
         (node, [found for _, found in uses[name]])
@@ -71,10 +71,11 @@ def _lost_by_node(context: CheckContext) -> dict[str, list[DataPath]]:
 
 
 def _check_names(
-    context: CheckContext, uses: dict[str, list[tuple[Binding, Reading]]]
+    context: CheckContext,
+    uses: dict[str, list[tuple[Binding, Reading]]],
+    lost: dict[str, list[DataPath]],
 ) -> Iterator[Diagnostic]:
     """Check the names that behaviours use, each place once."""
-    lost = _lost_by_node(context)
     declared = _declared_by_behaviour(context, uses)
     found: dict[tuple[Span, str], Diagnostic] = {}
     for name, node in context.spec.nodes.items():

@@ -56,20 +56,13 @@ class AnnotatedCopy:
 
     def original_column(self, line: int, column: int) -> int:
         """Return the column, from 1, in the original, of one in the copy."""
-        for edit in reversed(self._edits):
-            if edit.line != line:
-                continue
-            grown = sum(
-                len(each.text) - (each.end - each.start)
-                for each in self._edits
-                if each.line == line and each < edit
-            )
+        grown = 0
+        for edit in (each for each in self._edits if each.line == line):
             begin = edit.start + grown + 1
-            if column >= begin + len(edit.text):
-                column -= len(edit.text) - (edit.end - edit.start)
-            elif column >= begin:
-                column = begin
-        return column
+            if begin <= column < begin + len(edit.text):
+                return edit.start + 1
+            grown += (len(edit.text) - (edit.end - edit.start)) if column >= begin else 0
+        return column - grown
 
 
 @dataclass(slots=True)

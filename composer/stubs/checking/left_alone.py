@@ -10,7 +10,7 @@ import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from composer.python_source.syntax import count_characters, words_in
+from composer.python_source.syntax import FUNCTIONS, count_characters, words_in
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ _CAUGHT = frozenset(
         'UndeclaredParameterError',
     }
 )
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 _BRANCHES = (ast.If, ast.IfExp, ast.While, ast.Match, ast.BoolOp, ast.Assert)
 # What a node has in one system and not in another.
 _OF_FILE = frozenset({'parameters', 'name'})
@@ -143,7 +142,7 @@ class ReportedPlace:
     @property
     def function(self) -> FunctionNode | None:
         """The function that the report is in."""
-        return next((node for node in self.around if isinstance(node, _FUNCTIONS)), None)
+        return next((node for node in self.around if isinstance(node, FUNCTIONS)), None)
 
     @property
     def lines(self) -> range:

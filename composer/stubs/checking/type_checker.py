@@ -9,11 +9,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from composer.errors import ComposerError
 from composer.interfaces.build.build_cache import find_cache
-from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,7 +23,6 @@ _TIMEOUT_SEC = 60
 # As many results of runs are kept.
 _MOST_KEPT = 200
 _OPTIONS = ('--config', 'pyrefly.toml', '--output-format', 'json', '--summary=none')
-_NAMES = ('path', 'line', 'column', 'kind', 'message')
 # The presets differ from version to version, so each kind that is read is named. Whatever is not
 # in the stubs or the project is unknown: of libraries, nothing is reported.
 _SETTINGS = """\
@@ -62,8 +60,7 @@ class TypeCheckerError(ComposerError):
     """Pyrefly does not work."""
 
 
-@record
-class TypeReport:
+class TypeReport(NamedTuple):
     """What pyrefly says about a place.
 
     Attributes:
@@ -79,8 +76,7 @@ class TypeReport:
     message: str
 
 
-@record
-class TypeResult:
+class TypeResult(NamedTuple):
     """What a run of pyrefly gave.
 
     Attributes:
@@ -140,22 +136,19 @@ def run_type_checker(
 def load_result(digest: str) -> TypeResult | None:
     """Return the result that was kept for a digest, if there is one."""
     try:
-        kept = json.loads(_place_of(digest).read_bytes())
-        reports = tuple(TypeReport(*report) for report in kept['reports'])
-        return TypeResult(kept['version'], reports, kept['is_clean'])
-    except (OSError, ValueError, KeyError, TypeError):
+        version, reports, is_clean = json.loads(_place_of(digest).read_bytes())
+        return TypeResult(version, tuple(TypeReport(*report) for report in reports), is_clean)
+    except (OSError, ValueError, TypeError):
         return None
 
 
 def keep_result(digest: str, result: TypeResult) -> None:
     """Keep a result; where nothing can be written, the next run is like the first."""
     place = _place_of(digest)
-    reports = [[getattr(report, name) for name in _NAMES] for report in result.reports]
-    kept = {'version': result.version, 'reports': reports, 'is_clean': result.is_clean}
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile('w', dir=place.parent, delete=False) as file:
-            json.dump(kept, file)
+            json.dump(result, file)
         Path(file.name).replace(place)
         results = sorted(place.parent.glob('*.json'), key=lambda path: path.stat().st_mtime)
         for path in results[:-_MOST_KEPT]:

@@ -21,7 +21,7 @@ from composer.interfaces.message_types import in_python
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.python_source.syntax import words_in
 from composer.records import record
-from composer.spelling import did_you_mean, is_typo, suggest
+from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.stubs.checking.left_alone import CopySyntax, ReportedPlace
 from composer.stubs.checking.received_values import changed_names
 
@@ -95,7 +95,7 @@ class TypeFindings:
         messages: The full names of messages, by their classes; of one that several have, empty.
         own: The names that the project itself defines, or imports from elsewhere.
         modules: The names of its modules.
-        defined: What it gives to classes and objects, by whatever way.
+        defined: What it gives to classes and objects; with an empty text, any name.
     """
 
     context: CheckContext
@@ -232,7 +232,7 @@ class TypeFindings:
             and isinstance(node.value, ast.Name)
             and node.value.id == receiver
             and node.attr not in self.defined
-            and 'setattr' not in self.defined
+            and '' not in self.defined
             and not any(each.name == owner and each.decorator_list for each in classes)
             and not any(
                 getattr(base, 'id', '') == owner for each in classes for base in each.bases
@@ -258,9 +258,11 @@ class TypeFindings:
         constants = [constant.name for constant in description.constants]
         if name in constants or name.endswith('__DEFAULT'):
             return None
-        names = [*(field.name for field in description.fields), *constants]
-        error = unknown_field(in_python(full_name), name, names)
-        return node, 'unknown-field', str(error), error.help
+        error = unknown_field(
+            in_python(full_name), name, [each.name for each in description.fields]
+        )
+        near = find_nearest(name, constants) if name.isupper() else None
+        return node, 'unknown-field', str(error), did_you_mean(near, error.help)
 
     def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value is no union, of which reports name the part that does not fit."""

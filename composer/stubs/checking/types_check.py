@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.python_source.syntax import bound_names
 from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator
 from composer.stubs.checking.left_alone import CopySyntax
 from composer.stubs.checking.received_values import find_received_values
@@ -87,7 +86,7 @@ def find_type_errors(
             if not told & {*lines}:
                 told.add(lines[0])
                 kept.append(finding)
-    return kept, replace(result, is_clean=not every)
+    return kept, result._replace(is_clean=not every)
 
 
 @dataclass(slots=True)
@@ -142,27 +141,22 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
     """Return the names of classes of which the stubs do not tell all, and all that are defined.
 
     The first are classes that the modules define, import from anywhere but ROS, or add attributes
-    to; the second all names that their code may give to something,
-    with `setattr` for any name.
+    to; the second all names that their code may give to something, with an empty one for any.
     """
     own: set[str] = set()
     defined: set[str] = set()
     for module in modules.values():
-        imports = module.source.imports.items()
+        imports, top = module.source.imports.items(), module.source.top
         own |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
+        defined |= {*top.stored_attributes} | top.all_stored - {name for name, _ in imports}
         for node in ast.walk(module.tree):
-            names = [] if isinstance(node, ast.Import | ast.ImportFrom) else bound_names(node)
-            defined.update(names)
-            own.update(names if isinstance(node, ast.ClassDef) else ())
             match node:
-                case ast.Attribute(value=owner, attr=name, ctx=ast.Store()):
+                case ast.ClassDef(name=name):
+                    own.add(name)
+                case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Store()):
+                    own.add(owner)
+                case ast.Constant(value=str(name)) if name:
                     defined.add(name)
-                    own |= {owner.id} if isinstance(owner, ast.Name) else set()
-                case ast.Constant(value=str(name)):
-                    defined.add(name)
-                case ast.Name(id='setattr' | 'vars') | ast.Attribute(attr='__dict__'):
-                    # Any name.
-                    defined.add('setattr')
     return frozenset(own), frozenset(defined)
 
 
