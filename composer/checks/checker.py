@@ -6,14 +6,19 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.checks.behaviours.behaviour_arguments import check_compared_arguments, check_monitors
 from composer.checks.behaviours.behaviour_bodies import check_bodies
-from composer.checks.behaviours.behaviour_functions import check_behaviour_sources
+from composer.checks.behaviours.behaviour_functions import (
+    check_annotations,
+    check_behaviour_sources,
+)
 from composer.checks.behaviours.blocked_groups import check_blocked_groups
 from composer.checks.behaviours.missing_modules import check_missing_modules
-from composer.checks.behaviours.transforms import check_transforms
+from composer.checks.behaviours.shipped_behaviours import (
+    check_compared_arguments,
+    check_monitors,
+    check_transforms,
+)
 from composer.checks.behaviours.unknown_and_unused import check_uses
-from composer.checks.behaviours.wrong_annotations import check_annotations
 from composer.checks.connections.channels import check_channel_types, check_servers
 from composer.checks.connections.deadlocks import check_deadlocks
 from composer.checks.connections.lifecycles import check_awaited_states, check_lifecycles

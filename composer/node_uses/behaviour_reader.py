@@ -8,7 +8,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
-from composer.node_uses.names import Names, is_of_project
+from composer.node_uses.names import (
+    Chain,
+    Class,
+    Function,
+    Instance,
+    Names,
+    Scope,
+    Value,
+    is_of_project,
+)
 from composer.node_uses.reading import (
     SENDING_METHODS,
     USED_NOUNS,
@@ -19,7 +28,6 @@ from composer.node_uses.reading import (
     unknown_reading,
     wire_of,
 )
-from composer.node_uses.values import Chain, Class, Function, Instance, Scope, Value
 from composer.node_uses.walk import TooLongError, Walk
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from composer.node_uses.names import Texts
 from composer.node_uses.reading import (
     CREATING_METHODS,
     SENDING_METHODS,
@@ -15,16 +16,14 @@ from composer.node_uses.reading import (
     Reading,
     StateUse,
 )
-from composer.node_uses.values import Texts
 
 if TYPE_CHECKING:
     import ast
     from collections.abc import Iterator
 
     from composer.diagnostics import Span
-    from composer.node_uses.names import Names
+    from composer.node_uses.names import Chain, Made, Names, Scope, Value
     from composer.node_uses.reading import Waited
-    from composer.node_uses.values import Chain, Made, Scope, Value
     from composer.python_source.modules import ModuleSource
 
 

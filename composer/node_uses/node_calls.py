@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
 from composer.node_uses.message_uses import NotLiteralError, literal_of
+from composer.node_uses.names import Chain, External, Function, Texts, only_text
 from composer.node_uses.reading import (
     CREATING_METHODS,
     SENDING_METHODS,
@@ -15,7 +16,6 @@ from composer.node_uses.reading import (
     Payload,
     RemoteParameter,
 )
-from composer.node_uses.values import Chain, External, Function, Texts, only_text
 from composer.python_source.modules import read_signature
 from composer.schema.structure import find_problem
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from composer.node_uses.current_run import Run
+    from composer.node_uses.names import Scope, Value
     from composer.node_uses.reading import Waited
-    from composer.node_uses.values import Scope, Value
 
 # A test holds these against `composer.Node`.
 _SIGNATURES = {

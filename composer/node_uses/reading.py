@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Related, Span
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
-    from composer.node_uses.values import Value
+    from composer.node_uses.names import Value
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.

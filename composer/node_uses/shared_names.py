@@ -11,8 +11,7 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.node_uses.names import Names
-from composer.node_uses.values import Class, External, Function, Instance, Made, Scope
+from composer.node_uses.names import Class, External, Function, Instance, Made, Names, Scope
 from composer.node_uses.waiting import FILLING
 from composer.python_source.modules import MOST_BASES
 from composer.python_source.syntax import list_nodes, words_in

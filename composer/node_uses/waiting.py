@@ -6,13 +6,13 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.node_uses.message_uses import number_of
+from composer.node_uses.names import Chain, External, Made
 from composer.node_uses.reading import Awaited, Block
-from composer.node_uses.values import Chain, External, Made
 from composer.python_source.syntax import own_nodes
 
 if TYPE_CHECKING:
     from composer.node_uses.current_run import Run
-    from composer.node_uses.values import Scope
+    from composer.node_uses.names import Scope
 
 _PUTTING = frozenset({'put', 'put_nowait'})
 QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')

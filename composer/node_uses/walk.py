@@ -12,15 +12,7 @@ from typing import TYPE_CHECKING
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
 from composer.node_uses.current_run import Run
-from composer.node_uses.reading import (
-    Awaited,
-    MessageUse,
-    NeededValue,
-    Passed,
-    Payload,
-    StateUse,
-)
-from composer.node_uses.values import (
+from composer.node_uses.names import (
     Chain,
     Class,
     External,
@@ -30,6 +22,14 @@ from composer.node_uses.values import (
     Scope,
     Texts,
     Value,
+)
+from composer.node_uses.reading import (
+    Awaited,
+    MessageUse,
+    NeededValue,
+    Passed,
+    Payload,
+    StateUse,
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind

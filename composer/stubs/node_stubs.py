@@ -2,19 +2,248 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.records import record
-from composer.stubs.field_types import StubImports, is_writable
-from composer.stubs.node_shapes import parameter_types
+from composer.stubs.message_stubs import StubImports, is_writable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from composer.language.specs import NodeSpec
-    from composer.stubs.node_shapes import NodeShape, Types
+    from composer.language.specs import NodeSpec, ParameterSpec
+    from composer.node_uses.reading import CreatedEntity
+
+# The types of the entities of one section, by name. Behaviours create some whose name or type is
+# not known: that is empty.
+Types: TypeAlias = 'tuple[tuple[str, tuple[str, ...]], ...]'
+
+_PARAMETER_TYPES = {
+    'bool': 'bool',
+    'integer': 'int',
+    'double': 'float',
+    'string': 'str',
+    'byte_array': 'list[bytes]',
+    'bool_array': 'list[bool]',
+    'integer_array': 'list[int]',
+    'double_array': 'list[float]',
+    'string_array': 'list[str]',
+}
+# The parameters that rclpy declares for every node.
+_OWN_PARAMETERS = {'use_sim_time': 'bool', 'start_type_description_service': 'bool'}
+_ANYTHING = 'Any'
+# Of the full name of a type: `std_msgs/msg/String`.
+_SLASHES = 2
+# The types of choices that a type can name.
+_NAMED = (bool, int, str)
+# Whoever uses these may set names that no check can see.
+_OPEN = frozenset({'__dict__', 'vars'})
+# The methods of a node that return what has a type of its own.
+_RETURNED = {'now': 'Time'}
+_ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
+_NUMBERS = frozenset({'int', 'float'})
+
+
+@record
+class NodeShape:
+    """What a node declares; equal ones need one stub.
+
+    Attributes:
+        publishers: The types of messages, by publisher.
+        service_clients: The types of services, by client.
+        action_clients: The types of actions, by client.
+        parameters: The Python types of values, by parameter.
+        state: The types of what `node.state` has, by name; `None` if it may have any.
+    """
+
+    publishers: Types
+    service_clients: Types
+    action_clients: Types
+    parameters: Types
+    state: Types | None
+
+
+def shape_of(
+    node: NodeSpec,
+    stored: Sequence[Mapping[str, frozenset[str]] | None],
+    created: Sequence[CreatedEntity],
+) -> NodeShape:
+    """Return the shape of a node.
+
+    Args:
+        stored: What each module of its behaviours may set in `node.state`, as
+            `find_stored_names` returns it.
+        created: What its behaviours create.
+    """
+    return NodeShape(
+        _types(node.publishers, created, 'publisher'),
+        _types(node.service_clients, created, 'service client'),
+        _types(node.action_clients),
+        parameter_types(node),
+        _state_of(node, stored),
+    )
+
+
+def _state_of(
+    node: NodeSpec, stored: Sequence[Mapping[str, frozenset[str]] | None]
+) -> Types | None:
+    known = [names for names in stored if names is not None]
+    if len(known) < len(stored):
+        return None
+    names = sorted({*node.state}.union(*known))
+    return tuple((name, (_type_of_state(node.state.get(name), known, name),)) for name in names)
+
+
+def parameter_types(node: NodeSpec) -> Types:
+    """Return the Python types of a node's parameters, with those that rclpy declares."""
+    parameters = {name: (_type_of(each),) for name, each in node.parameters.items()}
+    own = {name: (of_type,) for name, of_type in _OWN_PARAMETERS.items()}
+    return tuple(sorted({**own, **parameters}.items()))
+
+
+def merge_shapes(shapes: Iterable[NodeShape]) -> NodeShape:
+    """Return the shape that has what any of these has.
+
+    A behaviour of several nodes may use what only some of them declare.
+    """
+    several = list(dict.fromkeys(shapes))
+    if len(several) == 1:
+        return several[0]
+    states = [shape.state for shape in several if shape.state is not None]
+    return NodeShape(
+        _merged(shape.publishers for shape in several),
+        _merged(shape.service_clients for shape in several),
+        _merged(shape.action_clients for shape in several),
+        _merged(shape.parameters for shape in several),
+        _merged(states) if len(states) == len(several) else None,
+    )
+
+
+def _merged(sections: Iterable[Types]) -> Types:
+    merged: dict[str, dict[str, None]] = {}
+    for section in sections:
+        for name, types in section:
+            merged.setdefault(name, {}).update(dict.fromkeys(types))
+    # The first overload that fits counts, so the one for any name comes last.
+    names = sorted(merged, key=lambda name: (not name, name))
+    return tuple((name, tuple(merged[name])) for name in names)
+
+
+def _types(
+    entities: Mapping[str, Any], created: Iterable[CreatedEntity] = (), kind: str = ''
+) -> Types:
+    declared = [(name, (each.type,)) for name, each in entities.items()]
+    made = [(each.name or '', (_full_name(each),)) for each in created if each.kind == kind]
+    return _merged([(*declared, *made)])
+
+
+def _full_name(created: CreatedEntity) -> str:
+    """Return the type of what a behaviour creates; empty if what it gives is none."""
+    return created.type if created.type and created.type.count('/') == _SLASHES else ''
+
+
+def _type_of(parameter: ParameterSpec) -> str:
+    """Return the Python type of a parameter's value.
+
+    One that is not set has the value `None`, until somebody sets it.
+    """
+    of_type = _PARAMETER_TYPES.get(parameter.type or '', _ANYTHING)
+    choices = parameter.choices or ()
+    if of_type in ('int', 'str') and choices and all(type(each) in _NAMED for each in choices):
+        of_type = f'Literal[{", ".join(map(repr, choices))}]'
+    return f'{of_type} | None' if parameter.value is None and of_type != _ANYTHING else of_type
+
+
+def find_stored_names(tree: ast.Module, module: str) -> dict[str, frozenset[str]] | None:
+    """Return every name that a module sets as an attribute of anything, with the types of values.
+
+    A class of the module itself is shown as `module:Class`.
+
+    It need not be `node.state` itself that it names: that may be passed on, or have another name.
+
+    Returns:
+        None if it may set names that are not written out.
+    """
+    names: dict[str, set[str]] = {}
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    classes = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
+    own = {name: f'{module}:{name}' for name in classes}
+    values = dict(_assigned(tree, own))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
+            names.setdefault(node.attr, set()).add(values.get(id(node), _ANYTHING))
+        elif isinstance(node, ast.Attribute | ast.Name) and (
+            _name_of(node) in _OPEN or (_name_of(node) == 'setattr' and id(node) not in called)
+        ):
+            return None
+        elif isinstance(node, ast.Call) and _name_of(node.func) == 'setattr':
+            name = node.args[1] if len(node.args) > 1 else None
+            if not (isinstance(name, ast.Constant) and isinstance(name.value, str)):
+                return None
+            names.setdefault(name.value, set()).add(_ANYTHING)
+    return {name: frozenset(types) for name, types in names.items()}
+
+
+def _type_of_state(
+    value: object, stored: Iterable[Mapping[str, frozenset[str]]], name: str
+) -> str:
+    """Return the type of a name of the state: of its value in the file, and of all that is stored.
+
+    Args:
+        value: The value in the file; `None` if there is none, as nothing is known of it.
+    """
+    types = {type(value).__name__}.union(*(names.get(name, frozenset()) for names in stored))
+    if isinstance(value, float) and types <= {*_NUMBERS, '+=', 'NoneType', _ANYTHING}:
+        # What the file declares as a number is one, whatever computes it.
+        return 'float'
+    if '+=' in types:
+        # A number stays one, with whatever it is added to or multiplied by.
+        types = types - {'+='} | ({'float'} if types & _NUMBERS else {_ANYTHING})
+    types.discard('NoneType')
+    if len(types) == 1 and ':' in ''.join(types):
+        return types.pop()
+    known = types <= {'bool', 'int', 'float', 'str', 'Time'}
+    return ' | '.join(sorted(types)) if known and types else _ANYTHING
+
+
+def _assigned(tree: ast.Module, own: Mapping[str, str]) -> Iterator[tuple[int, str]]:
+    """Yield what is assigned to, and the type of its value."""
+    # Arrays of NumPy turn what they are added to into an array.
+    is_plain = not any(
+        alias.name.partition('.')[0] == 'numpy'
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    )
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign):
+            yield from ((id(target), _type_stored(node.value, own)) for target in node.targets)
+        elif isinstance(node, ast.AugAssign) and is_plain and isinstance(node.op, _ARITHMETIC):
+            yield id(node.target), '+='
+
+
+def _type_stored(value: ast.expr, own: Mapping[str, str]) -> str:
+    match value:
+        case ast.Call(func=ast.Name(id=name)) if name in own:
+            return own[name]
+        case ast.Constant():
+            return type(value.value).__name__
+        case ast.JoinedStr():
+            return 'str'
+        case ast.Compare(ops=[ast.Is() | ast.IsNot() | ast.In() | ast.NotIn(), *_]):
+            return 'bool'
+        case ast.Call(func=ast.Attribute(attr=method), args=[]) if method in _RETURNED:
+            return _RETURNED[method]
+    return _ANYTHING
+
+
+def _name_of(node: ast.expr) -> str:
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ''
+
 
 _TIMEOUT = 'timeout: float | None = 5.0'
 _NO_PARAMETER = 'the node declares no such parameter, or one of another type'

@@ -7,10 +7,8 @@ import re
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from composer.stubs.field_types import SUPPORT
-from composer.stubs.message_stubs import write_packages
-from composer.stubs.node_shapes import find_stored_names, shape_of
-from composer.stubs.node_stubs import write_nodes
+from composer.stubs.message_stubs import SUPPORT, write_packages
+from composer.stubs.node_stubs import find_stored_names, shape_of, write_nodes
 from composer.stubs.project_modules import all_nodes, find_project_modules, reach_of
 
 if TYPE_CHECKING:
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.language.specs import NodeSpec
     from composer.node_uses.reading import CreatedEntity
-    from composer.stubs.node_shapes import NodeShape
+    from composer.stubs.node_stubs import NodeShape
     from composer.stubs.project_modules import ProjectModule
 
 HEADER = '# Written by `composer stubs`: changes are lost the next time.'

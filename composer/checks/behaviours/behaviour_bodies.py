@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
 from composer.checks.behaviours.behaviour_functions import is_called_wrongly
-from composer.checks.behaviours.transforms import is_shipped
+from composer.checks.behaviours.shipped_behaviours import is_shipped
 from composer.checks.parameters import OF_EVERY_NODE, find_refusal
 from composer.checks.references import describe_missing_type
 from composer.diagnostics import Related, diagnostic_at

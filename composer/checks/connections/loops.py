@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from composer.checks.behaviours.transforms import is_shipped
+from composer.checks.behaviours.shipped_behaviours import is_shipped
 from composer.checks.connections.cycles import find_cycles
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource

@@ -22,8 +22,8 @@ from composer.node_uses.node_calls import OF_RCLPY
 from composer.python_source.syntax import words_in
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
+from composer.stubs.checking.annotated_copies import changed_names
 from composer.stubs.checking.left_alone import CopySyntax, ReportedPlace
-from composer.stubs.checking.received_values import changed_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Related
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.specs import NodeSpec
-    from composer.stubs.checking.received_values import FunctionKey, FunctionUse, Received
+    from composer.stubs.checking.annotated_copies import FunctionKey, FunctionUse, Received
     from composer.stubs.checking.type_checker import TypeReport
-    from composer.stubs.node_shapes import NodeShape
+    from composer.stubs.node_stubs import NodeShape
 
 # Where something is wrong, its rule, and the message with the help.
 _Problem: TypeAlias = 'tuple[ast.expr, str, str, str | None]'

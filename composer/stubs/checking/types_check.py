@@ -7,14 +7,12 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator
+from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator, find_received_values
 from composer.stubs.checking.left_alone import CopySyntax
-from composer.stubs.checking.received_values import find_received_values
 from composer.stubs.checking.type_checker import run_type_checker
 from composer.stubs.checking.type_findings import TypeFindings
-from composer.stubs.field_types import SUPPORT
-from composer.stubs.node_shapes import NodeShape, merge_shapes
-from composer.stubs.node_stubs import write_nodes
+from composer.stubs.message_stubs import SUPPORT
+from composer.stubs.node_stubs import NodeShape, merge_shapes, write_nodes
 from composer.stubs.project_modules import all_nodes
 from composer.stubs.system_stubs import (
     class_name,

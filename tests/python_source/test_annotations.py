@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.python_source.value_annotations import find_wanted_values
+from composer.python_source.annotations import find_wanted_values
 
 
 def wanted(annotation, value, **others):
