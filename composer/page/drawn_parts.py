@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import threading
 from collections import defaultdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 
     from composer.checks.context import CheckContext
     from composer.drawing.excerpts import Excerpt
-    from composer.drawing.picture import Edge, Picture
+    from composer.drawing.picture import Edge, Picture, Side
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
 
@@ -33,6 +35,7 @@ _MOST_ENDS = 6
 _MOST_CODE_LINES = 15
 # What is left for the drawing in a window of 1440 by 900.
 _STAGE = 680, 850
+_MOST_FOLDED = 16
 
 
 def list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
@@ -60,39 +63,79 @@ def _find_code(context: CheckContext, behaviour: BehaviourSpec) -> dict[str, Any
     return {'file': relative_path(str(module.path)), 'first': found.lineno, 'lines': lines}
 
 
-def describe_drawing(
-    picture: Picture,
-    code: dict[str, list[dict[str, Any]]] | None = None,
-    folded: Collection[str] = (),
-    direction: str = '',
-) -> dict[str, Any]:
-    """Return a picture as the page takes it: its SVG, and its parts by their tokens.
+class Drawing:
+    """A system as it is drawn, as a whole and with folded boxes.
 
     Args:
         code: See `list_code`.
-        folded: See `arrange_shapes`.
         direction: `LR` or `TB`; empty for the one that is read with less zooming.
+
+    Attributes:
+        shown: What the page takes: the SVG, and the parts by their tokens; nothing is folded.
+        name: Of the system.
+        nodes: The full names of the nodes.
+        topics: Those of the topics.
+        topic_of_ends: The topic of each publisher and subscription, by the ids of these.
 
     Raises:
         DrawingError: Graphviz is missing or failed.
     """
-    drawn = arrange_shapes(picture, folded)
-    tried = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
-    documents = {
-        each: _inlined(svg.render_picture(picture, folded, each))
-        for each in ([direction] if direction else tried)
-    }
-    direction = min(documents, key=lambda each: _shrinkage(documents[each]))
-    return {
-        'name': picture.name,
-        'description': picture.description,
-        'svg': documents[direction],
-        'direction': direction,
-        'code': code or {},
-        'folder': str(Path.cwd()),
-        'stands_in': drawn.stands_in,
-        **_describe(picture, drawn),
-    }
+
+    def __init__(
+        self,
+        picture: Picture,
+        code: Mapping[str, list[dict[str, Any]]] | None = None,
+        direction: str = '',
+    ) -> None:
+        self._picture, self._code = picture, code or {}
+        tried = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
+        self._directions = [direction] if direction else tried
+        self.name = picture.name
+        self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
+        self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
+        self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
+        self._lock = threading.Lock()
+        self._folded: dict[frozenset[str], dict[str, Any]] = {}
+        self.shown = self._describe(frozenset())
+
+    def fold(self, folded: Collection[str]) -> dict[str, Any]:
+        """Return it with these boxes folded; one at a time, and the last ones are kept."""
+        parts = self.shown['parts'].values()
+        key = frozenset(part['id'] for part in parts if 'members' in part).intersection(folded)
+        if not key:
+            return self.shown
+        with self._lock:
+            if key not in self._folded:
+                if len(self._folded) >= _MOST_FOLDED:
+                    self._folded.pop(next(iter(self._folded)))
+                self._folded[key] = self._describe(key)
+            return self._folded[key]
+
+    def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
+        """Return it with the ends outside of topics, too, laid out in the same direction."""
+        sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
+        channels = []
+        for channel in self._picture.channels:
+            ends = outside.get(channel.name, ()) if channel.kind == 'topic' else ()
+            shown = dict.fromkeys((*channel.external, *(sides[end['kind']] for end in ends)))
+            channels.append(replace(channel, external=tuple(shown)))
+        picture = replace(self._picture, channels=tuple(channels))
+        return Drawing(picture, self._code, self._directions[0])
+
+    def _describe(self, folded: Collection[str]) -> dict[str, Any]:
+        documents = {
+            each: _inlined(svg.render_picture(self._picture, folded, each))
+            for each in self._directions
+        }
+        self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
+        drawn = arrange_shapes(self._picture, folded)
+        return {
+            'svg': documents[self._directions[0]],
+            'code': self._code,
+            'folder': str(Path.cwd()),
+            'stands_in': drawn.stands_in,
+            **_describe(self._picture, drawn),
+        }
 
 
 def _inlined(document: str) -> str:
@@ -197,7 +240,5 @@ def _part(
         'facts': facts,
         'findings': findings,
         'near': near,
-        'excerpts': [
-            {'file': each.file, 'first': each.first, 'lines': each.lines} for each in excerpts
-        ],
+        'excerpts': [asdict(each) for each in excerpts],
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.application.running_systems.live_graph import LiveGraph
@@ -16,7 +17,7 @@ from composer.yaml_text.writer import render_yaml
 
 if TYPE_CHECKING:
     from composer.application.running_systems.client import Client, RunningSystem
-    from composer.page.recording import Recording
+    from composer.recordings.system_recorder import SystemRecorder
 
 _ANSWER_SEC = 3.0
 _RELOAD_SEC = 60.0
@@ -88,6 +89,60 @@ def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
     return {'text': text, 'type': interface_name(interface)}
 
 
+class Recording:
+    """Records the ROS graph, each time into a new folder of rosbag2 in the current folder.
+
+    Attributes:
+        target: What is written now; empty if nothing is.
+        told: What was said of it last.
+    """
+
+    def __init__(self) -> None:
+        self.target = self.told = ''
+        self._recorder: SystemRecorder | None = None
+
+    def begin(self, client: Client) -> str:
+        """Begin, and return what is written.
+
+        Raises:
+            ComposerError: One is under way, or the file cannot be written.
+        """
+        from composer.recordings.recording_place import new_folder
+        from composer.recordings.system_recorder import create_recorder
+
+        if self.target:
+            message = f"'{self.target}' is being recorded already"
+            raise ComposerError(message)
+        target = Path.cwd() / new_folder()
+        recorder = create_recorder(target, (), self)
+        try:
+            recorder.start(client.node.context)
+        except Exception:
+            recorder.stop()
+            raise
+        self._recorder, self.target = recorder, str(target)
+        return f"recording to '{target}'"
+
+    def end(self) -> str:
+        """End it, and return what became of it.
+
+        Raises:
+            ComposerError: Nothing is recorded.
+        """
+        if self._recorder is None:
+            message = 'nothing is recorded'
+            raise ComposerError(message)
+        self._recorder.stop()
+        self._recorder, self.target = None, ''
+        return self.told
+
+    def info(self, message: str) -> None:
+        """Note what is said."""
+        self.told = message
+
+    warning = error = info
+
+
 def act(
     client: Client, system: RunningSystem, wish: dict[str, str], recording: Recording
 ) -> dict[str, Any]:
@@ -102,6 +157,7 @@ def act(
         ComposerError: It cannot be done, or what is wanted does not fit.
     """
     action, name, text = (wish.get(key, '') for key in ('action', 'name', 'text'))
+    graph = LiveGraph(client, _ANSWER_SEC)
     if action in ('reload', 'restart', 'stop', 'start'):
         outcome = (
             client.ask(system, protocol.RELOAD, _RELOAD_SEC)
@@ -115,15 +171,14 @@ def act(
         told = recording.begin(client) if action == 'record' else recording.end()
     elif action == 'set':
         parameter = wish.get('parameter', '')
-        LiveGraph(client, _ANSWER_SEC).set_parameter(name, parameter, text)
+        graph.set_parameter(name, parameter, text)
         told = f'{parameter} = {text}'
     elif action == 'call':
-        graph = LiveGraph(client, _ANSWER_SEC)
         service, service_class = graph.find('service', name)
         request = read_payload(text, service_class.Request)
         told = _render(graph.call(service, service_class, request))
     elif action == 'publish':
-        told = _publish(LiveGraph(client, _ANSWER_SEC), name, text)
+        told = _publish(graph, name, text)
     else:
         message = f"there is no action '{action}'"
         raise ComposerError(message)
@@ -161,15 +216,9 @@ def _range(descriptor: Any) -> list[float] | None:
 
 
 def _describe_value(value: Any) -> dict[str, Any]:
-    """Return a `value`, or the beginning of its text if it `is_cut`."""
-    plain = _plain(value)
-    text = json.dumps(plain)
+    """Return a `value` as JSON has it, or the beginning of its text if it `is_cut`."""
+    # Arrays and bytes are lists.
+    text = json.dumps(value, default=list)
     is_cut = len(text) > _LONGEST_VALUE
-    return {'value': f'{text[:_LONGEST_VALUE]}…' if is_cut else plain, 'is_cut': is_cut}
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON has it."""
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    return [_plain(each) for each in (value if not isinstance(value, bytes) else list(value))]
+    shown = f'{text[:_LONGEST_VALUE]}…' if is_cut else json.loads(text)
+    return {'value': shown, 'is_cut': is_cut}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import threading
-from contextlib import suppress
-from time import time_ns
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from composer.application.plan import plan_from
 from composer.application.system_reader import list_files
+from composer.application.watched_files import WatchedFiles
 from composer.drawing.json_document import describe_finding
 from composer.errors import ComposerError
 from composer.planning.text import render_plan
@@ -22,47 +21,38 @@ _MOST_LINES = 200
 class SavedFiles:
     """Compares the files of a system with what runs, whenever one of them is saved.
 
+    Args:
+        running: What it runs from; for the others, too, see `plan_from`.
+
     Attributes:
         next_plan: `lines`, as `composer plan` prints them, and `findings`; `None` if a reload
             would change nothing.
     """
 
-    def __init__(self) -> None:
-        self.next_plan: dict[str, Any] | None = None
-        self._given: tuple[str, list[Path], list[str], list[str]] | None = None
-        self._files: list[Path] = []
-        self._times: dict[Path, int] = {}
-        self._thread: threading.Thread | None = None
-
-    def follow(
+    def __init__(
         self, running: str, paths: list[Path], words: list[str], set_values: list[str]
     ) -> None:
-        """Compare from now on with what a system runs from; see `plan_from`."""
+        self.next_plan: dict[str, Any] | None = None
         self._given = running, paths, words, set_values
-        self.next_plan, self._times = None, {}
-        self._files = paths
+        # None has been read so far.
+        self._files = WatchedFiles(paths, begun_ns=0)
+        self._thread: Thread | None = None
 
     def look(self) -> None:
         """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
-        if self._given is None or (self._thread and self._thread.is_alive()):
+        if (self._thread and self._thread.is_alive()) or not self._files.list_changed():
             return
-        times = {each: _time_of(each) for each in self._files}
-        if times != self._times:
-            self._times = times
-            name = 'composer-next-plan'
-            self._thread = threading.Thread(
-                target=self._plan, args=(self._given,), name=name, daemon=True
-            )
-            self._thread.start()
+        self._files.note_reading()
+        self._thread = Thread(target=self._plan, name='composer-next-plan', daemon=True)
+        self._thread.start()
 
-    def _plan(self, given: tuple[str, list[Path], list[str], list[str]]) -> None:
+    def _plan(self) -> None:
         lines: list[str] = []
         findings: list[Any] = []
-        files, begun_ns = given[1], time_ns()
         try:
-            plan, found, context = plan_from(*given)
+            plan, found, context = plan_from(*self._given)
             if context is not None:
-                files = sorted(list_files(context))
+                self._files.follow(list_files(context))
             if plan is None:
                 findings = [describe_finding(each) for each in found]
             elif plan.operations:
@@ -70,15 +60,4 @@ class SavedFiles:
         except (ComposerError, OSError) as error:
             # A file may go while it is read.
             lines = [str(error)]
-        if self._given is given:
-            # One that was saved meanwhile is looked at again.
-            more = {each: _time_of(each) for each in files if each not in self._times}
-            self._times |= {each: found for each, found in more.items() if found < begun_ns}
-            self._files = files
-            self.next_plan = {'lines': lines, 'findings': findings} if lines or findings else None
-
-
-def _time_of(path: Path) -> int:
-    with suppress(OSError):
-        return path.stat().st_mtime_ns
-    return 0
+        self.next_plan = {'lines': lines, 'findings': findings} if lines or findings else None

@@ -1,4 +1,4 @@
-"""The HTTP server of the page: loopback only, with a secret, and read-only by default."""
+"""`composer page`: an HTTP server for this computer only, with a secret, read-only by default."""
 
 from __future__ import annotations
 
@@ -6,39 +6,55 @@ import asyncio
 import hmac
 import json
 import math
+import os
 import secrets
+import signal
 import socket
 import sys
-from concurrent.futures import Future
+import threading
+import webbrowser
 from contextlib import aclosing, suppress
-from importlib import resources
+from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 
-import uvicorn
-from starlette.applications import Starlette
-from starlette.requests import Request
-from starlette.responses import (
-    HTMLResponse,
-    PlainTextResponse,
-    RedirectResponse,
-    Response,
-    StreamingResponse,
-)
-from starlette.routing import Route
+import click
 
-from composer.errors import ComposerError
-from composer.page.looks import act, list_parameters, look_at_message, show_template
-from composer.page.recording import Recording
+from composer.errors import ComposerError, ExitCode, UsageError
+from composer.page.looks import (
+    Recording,
+    act,
+    list_parameters,
+    look_at_message,
+    show_template,
+)
+from composer.page.watched_system import DrawnFiles, WatchedSystem
+from composer.records import record
+
+try:
+    import uvicorn
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import (
+        FileResponse,
+        PlainTextResponse,
+        RedirectResponse,
+        Response,
+        StreamingResponse,
+    )
+    from starlette.routing import Route
+except ImportError as error:
+    message = f'the page needs {error.name}, which is not installed'
+    raise ComposerError(message, help="pip install 'rclpy-composer[page]'") from error
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Awaitable, Callable
+    from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
     from composer.application.running_systems.client import Client
-    from composer.page.watched_system import DrawnFiles
 
+_LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 _HEADERS = {
     'cache-control': 'no-store',
     'content-security-policy': (
@@ -54,27 +70,85 @@ _MOST_STREAMS = 16
 # A browser that does not read so long is dropped.
 _SEND_SEC = 10.0
 _KEEP_ALIVE_SEC = 15.0
-# Who has asked so recently looks at the answer.
-_LOOK_SEC = 5.0
 # States come no faster than they can be looked at.
-_SHORTEST_PAUSE_SEC = 0.25
+_PAUSE_SEC = 0.25
 _ANSWER_SEC = 12.0
 _ACT_SEC = 70.0
 _LONGEST_WISH = 100_000
 _MOST_DIGITS = 20
 # Of a message, and of each text in the state: 1 MB would come with each period.
 _LONGEST_TEXT, _LONGEST_WORDS = 100_000, 10_000
-_ASSETS = {'page.css': 'text/css', 'page.js': 'text/javascript'}
+_FILES = Path(__file__).parent
+_ASSETS = ('page.css', 'page.js')
+
+
+@record
+class PageOptions:
+    """The options of a command line.
+
+    Attributes:
+        port: 0 for any that is free.
+        listen: The address; another one than this computer's own is refused.
+        opens: Whether to open a browser, where there is a desktop.
+        allows_changes: Whether the page may change the system.
+        editor: The address of a line in an editor, with `{file}` and `{line}`; empty for none.
+        ends_with_input: Whether the end of standard input ends it, too.
+    """
+
+    port: int = 0
+    listen: str = '127.0.0.1'
+    opens: bool = False
+    allows_changes: bool = False
+    editor: str = ''
+    ends_with_input: bool = False
+
+
+def serve(
+    name: str | None,
+    paths: Sequence[Path],
+    words: Sequence[str],
+    set_values: Sequence[str],
+    options: PageOptions,
+) -> int:
+    """Serve a page until a signal comes; return the exit code.
+
+    Args:
+        name: Of a running system, if there are no files; `None` for the only one.
+        paths: A file and its layers.
+        words: The arguments of the file.
+        set_values: Of the file.
+
+    Raises:
+        UsageError: The address is another one's, or the words fit no file.
+        ComposerError: There is no such file, the port is taken, or the extra `page` is missing.
+    """
+    if options.listen not in _LOOPBACK:
+        message = 'the page is served to this computer alone: it is not encrypted'
+        advice = "ssh -L 8080:127.0.0.1:8080 HOST 'composer page --port 8080 --no-browser'"
+        raise UsageError(message, help=f'tunnel it: {advice}')
+    source = DrawnFiles(paths, words, set_values) if paths else WatchedSystem(name)
+    server = PageServer(source, options)
+    click.echo(
+        server.address if options.ends_with_input else f'{server.address}\nCtrl-C ends it',
+        err=True,
+    )
+    if options.ends_with_input:
+        threading.Thread(target=_end_with_input, name='composer-input', daemon=True).start()
+    if options.opens and (os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')):
+        with suppress(webbrowser.Error):
+            webbrowser.open(server.address)
+    server.run()
+    return ExitCode.DONE
+
+
+def _end_with_input() -> None:
+    # Its writer keeps it open, and ends somehow.
+    sys.stdin.buffer.read()
+    os.kill(os.getpid(), signal.SIGINT)
 
 
 class PageServer:
     """Serves what a source knows.
-
-    Args:
-        source: Where the page is from.
-        port: 0 for any that is free.
-        editor: The address of a line in an editor, with `{file}` and `{line}`; empty for none.
-        allows_changes: Whether the page may change the system.
 
     Raises:
         ComposerError: The port is taken.
@@ -83,35 +157,27 @@ class PageServer:
         address: With the secret, which is good for one browser after the other.
     """
 
-    def __init__(
-        self,
-        source: DrawnFiles,
-        port: int,
-        editor: str = '',
-        *,
-        allows_changes: bool = False,
-    ) -> None:
+    def __init__(self, source: DrawnFiles, options: PageOptions) -> None:
         self._source = source
         self._secret = secrets.token_urlsafe(32)
-        self._settings = {'allows_changes': allows_changes, 'editor': editor}
+        self._settings = {'allows_changes': options.allows_changes, 'editor': options.editor}
         self._recording = Recording()
-        self._asked = monotonic()
         # Each window that has it open has one.
-        self._wakers: set[asyncio.Event] = set()
+        self._streams = 0
         self._socket = socket.socket()
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._socket.bind(('127.0.0.1', port))
+            self._socket.bind(('127.0.0.1', options.port))
             # Who opens the address at once is served once all is ready.
             self._socket.listen(4 * _MOST_STREAMS)
         except OSError as error:
-            message = f'port {port} cannot be used: {error.strerror}'
+            message = f'port {options.port} cannot be used: {error.strerror}'
             raise ComposerError(message, help='choose another one with --port') from error
-        self.port: int = self._socket.getsockname()[1]
+        port = self._socket.getsockname()[1]
         # Cookies do not tell ports apart.
-        self._cookie = f'composer_page_{self.port}'
-        self._hosts = {f'{name}:{self.port}' for name in ('127.0.0.1', 'localhost')}
-        self.address = f'http://127.0.0.1:{self.port}/?token={self._secret}'
+        self._cookie = f'composer_page_{port}'
+        self._hosts = {f'{name}:{port}' for name in ('127.0.0.1', 'localhost')}
+        self.address = f'http://127.0.0.1:{port}/?token={self._secret}'
 
     def run(self) -> None:
         """Serve until a signal comes."""
@@ -125,31 +191,13 @@ class PageServer:
             limit_concurrency=4 * _MOST_STREAMS,
             lifespan='off',
         )
-        server = uvicorn.Server(config)
         self._source.start()
         try:
-            asyncio.run(self._serve(server))
+            uvicorn.Server(config).run(sockets=[self._socket])
         finally:
             if self._recording.target:
                 self._recording.end()
             self._source.stop()
-
-    async def _serve(self, server: uvicorn.Server) -> None:
-        loop = asyncio.get_running_loop()
-
-        def wake() -> None:
-            for each in self._wakers:
-                each.set()
-
-        def tell() -> None:
-            with suppress(RuntimeError):  # The loop has ended.
-                loop.call_soon_threadsafe(wake)
-
-        self._source.changed, self._source.is_looked_at = tell, self._is_looked_at
-        await server.serve(sockets=[self._socket])
-
-    def _is_looked_at(self) -> bool:
-        return bool(self._wakers) or monotonic() < self._asked + _LOOK_SEC
 
     def _routes(self) -> Starlette:
         return Starlette(
@@ -173,7 +221,7 @@ class PageServer:
         async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
             if scope['type'] != 'http':
                 return
-            self._asked = monotonic()
+            self._source.looked_at = monotonic()
 
             async def send_guarded(message: Message) -> None:
                 if message['type'] == 'http.response.start':
@@ -217,13 +265,11 @@ class PageServer:
             answer = RedirectResponse('/', status_code=303)
             answer.set_cookie(self._cookie, self._secret, httponly=True, samesite='strict')
             return answer
-        return HTMLResponse(_read_asset('page.html'))
+        return FileResponse(_FILES / 'page.html')
 
     async def _asset(self, request: Request) -> Response:
         name = request.path_params['name']
-        if name not in _ASSETS:
-            return Response(status_code=404)
-        return Response(_read_asset(name), media_type=_ASSETS[name])
+        return FileResponse(_FILES / name) if name in _ASSETS else Response(status_code=404)
 
     async def _state(self, _request: Request) -> Response:
         return _json(self._shown(), longest=_LONGEST_WORDS)
@@ -277,33 +323,32 @@ class PageServer:
         self, question: Callable[[Client], Any], timeout_sec: float = _ANSWER_SEC
     ) -> Response:
         """Return what the graph answers to a question."""
-        future: Future[Any] = Future()
-        self._source.ask(question, future)
         try:
-            return _json(await asyncio.wait_for(asyncio.wrap_future(future), timeout_sec))
+            future = asyncio.wrap_future(self._source.ask(question))
+            return _json(await asyncio.wait_for(future, timeout_sec))
         except Exception as error:  # noqa: BLE001 - rclpy raises many kinds
             more = getattr(error, 'help', None)
             text = str(error) or 'no answer'
             return _json({'problem': f'{text} ({more})' if more else text}, 504)
 
     async def _events(self, _request: Request) -> Response:
-        if len(self._wakers) >= _MOST_STREAMS:
+        if self._streams >= _MOST_STREAMS:
             return PlainTextResponse(f'{_MOST_STREAMS} windows have it open', status_code=503)
         return _Events(self._list_states(), media_type='text/event-stream')
 
     async def _list_states(self) -> AsyncIterator[str]:
         """Yield the newest state after each change."""
-        waker = asyncio.Event()
-        self._wakers.add(waker)
+        self._streams += 1
+        told, told_sec = None, 0.0
         try:
             while True:
-                waker.clear()
-                yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
-                await asyncio.sleep(_SHORTEST_PAUSE_SEC)
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(waker.wait(), _KEEP_ALIVE_SEC)
+                self._source.looked_at = now = monotonic()
+                if told is not self._source.state or now > told_sec + _KEEP_ALIVE_SEC:
+                    told, told_sec = self._source.state, now
+                    yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
+                await asyncio.sleep(_PAUSE_SEC)
         finally:
-            self._wakers.discard(waker)
+            self._streams -= 1
 
 
 class _Events(StreamingResponse):
@@ -313,10 +358,6 @@ class _Events(StreamingResponse):
         iterator: Any = self.body_iterator
         async with aclosing(iterator):
             await super().__call__(scope, receive, send)
-
-
-def _read_asset(name: str) -> str:
-    return resources.files('composer.page').joinpath(name).read_text(encoding='utf-8')
 
 
 def _json(data: Any, code: int = 200, longest: int = _LONGEST_TEXT) -> Response:

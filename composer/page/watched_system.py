@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
-from contextlib import suppress
-from dataclasses import replace
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from threading import Event, Thread
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 
@@ -19,28 +17,25 @@ from composer.application.running_systems.health import read_health
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
 from composer.drawing.picture import build_picture
-from composer.drawing.svg import DrawingError
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.page.drawn_parts import describe_drawing, list_code
+from composer.page.drawn_parts import Drawing, list_code
 from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.page.saved_files import SavedFiles
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from concurrent.futures import Future
-
-    from composer.drawing.picture import Picture, Side
+    from collections.abc import Callable, Sequence
 
 _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
 _STATUS_PERIOD_SEC = 2.0
 _POLL_SEC = 0.1
+# Who has asked so recently looks at the answer.
+_LOOK_SEC = 5.0
 # While nobody looks, the system is asked as seldom.
 _IDLE_SEC = 10.0
-_MOST_FOLDED = 16
 _MOST_LINES = 500
 _LONGEST_LINE = 2000
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
@@ -63,79 +58,26 @@ def draw_files(
     return Drawing(build_picture(context, findings), list_code(context))
 
 
-class Drawing:
-    """A system as it is drawn, as a whole and with folded boxes.
-
-    Attributes:
-        shown: See `describe_drawing`; nothing is folded.
-        nodes: The full names of the nodes.
-        topics: Those of the topics.
-        topic_of_ends: The topic of each publisher and subscription, by the ids of these.
-
-    Raises:
-        DrawingError: Graphviz is missing or failed.
-    """
-
-    def __init__(
-        self, picture: Picture, code: dict[str, list[dict[str, Any]]], direction: str = ''
-    ) -> None:
-        self._picture = picture
-        self._code = code
-        self.shown = describe_drawing(picture, code, direction=direction)
-        self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
-        self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
-        self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
-        self._lock = threading.Lock()
-        self._folded: dict[frozenset[str], dict[str, Any]] = {}
-
-    def fold(self, folded: frozenset[str]) -> dict[str, Any]:
-        """Return it with these boxes folded; one at a time, and the last ones are kept."""
-        folded &= {part['id'] for part in self.shown['parts'].values() if 'members' in part}
-        if not folded:
-            return self.shown
-        with self._lock:
-            if folded not in self._folded:
-                if len(self._folded) >= _MOST_FOLDED:
-                    self._folded.pop(next(iter(self._folded)))
-                self._folded[folded] = describe_drawing(
-                    self._picture, self._code, folded, self.shown['direction']
-                )
-            return self._folded[folded]
-
-    def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
-        """Return it with the ends outside of topics, too, laid out in the same direction."""
-        sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
-        channels = []
-        for channel in self._picture.channels:
-            ends = outside.get(channel.name, ()) if channel.kind == 'topic' else ()
-            shown = dict.fromkeys((*channel.external, *(sides[end['kind']] for end in ends)))
-            channels.append(replace(channel, external=tuple(shown)))
-        picture = replace(self._picture, channels=tuple(channels))
-        return Drawing(picture, self._code, self.shown['direction'])
-
-
 class DrawnFiles:
     """A system that does not run.
 
     Attributes:
-        state: What the page shows, but for the drawing.
+        state: What the page shows, but for the drawing; another object after each change.
         drawing: Of its files; `None` if they cannot be drawn.
         log: The last lines of `/rosout`.
         system: As it was found; `None` if it does not run.
-        changed: Called after each change of one of them.
-        is_looked_at: Returns whether somebody looks.
+        looked_at: When somebody looked last, on the monotonic clock.
     """
 
     def __init__(
         self, paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
     ) -> None:
         self.drawing = draw_files(paths, words, set_values) if paths else None
-        name = self.drawing.shown['name'] if self.drawing else ''
+        name = self.drawing.name if self.drawing else ''
         self.state: dict[str, Any] = {'name': name, 'runs': False, 'drawing': 1}
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
         self.system: RunningSystem | None = None
-        self.is_looked_at: Callable[[], bool] = lambda: True
-        self.changed: Callable[[], object] = lambda: None
+        self.looked_at = monotonic()
 
     def start(self) -> None:
         """There is nothing to watch."""
@@ -143,9 +85,10 @@ class DrawnFiles:
     def stop(self) -> None:
         """There is nothing to end."""
 
-    def ask(self, _question: Callable[[Client], Any], future: Future[Any]) -> None:
+    def ask(self, _question: Callable[[Client], Any]) -> Future[Any]:
         """Nobody answers."""
-        future.set_exception(ComposerError('the system does not run'))
+        message = 'the system does not run'
+        raise ComposerError(message)
 
 
 class WatchedSystem(DrawnFiles):
@@ -158,19 +101,18 @@ class WatchedSystem(DrawnFiles):
     def __init__(self, name: str | None) -> None:
         super().__init__(())
         self._name = name
-        self.state = {'name': name or '', 'runs': False}
-        self._saved = SavedFiles()
+        self.state = {'name': name or '', 'runs': False, 'drawing': 0}
+        self._saved: SavedFiles | None = None
         self._lines = 0
         self._rows: list[dict[str, Any]] = []
         # As the files say, without ends outside.
         self._declared: Drawing | None = None
-        self._topics: Mapping[str, str] = {}
         self._outside = OutsideEnds()
-        self._questions: SimpleQueue[tuple[Callable[[Client], Any], Future[Any]]] = SimpleQueue()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='composer-page', daemon=True)
+        self._ended = Event()
+        self._thread = Thread(target=self._run, name='composer-page', daemon=True)
         # What is asked, as a reload, may take long: what is watched stays fresh meanwhile.
-        self._answerer = threading.Thread(target=self._answer, name='composer-asks', daemon=True)
+        self._answerer = ThreadPoolExecutor(1, 'composer-asks')
+        self._asked: Future[Client] = Future()
 
     def start(self) -> None:
         """Begin to ask."""
@@ -180,23 +122,24 @@ class WatchedSystem(DrawnFiles):
         """Ask no more."""
         self._ended.set()
         self._thread.join(STATUS_SEC)
-        if self._answerer.ident is not None:
-            self._answerer.join(STATUS_SEC)
 
-    def ask(self, question: Callable[[Client], Any], future: Future[Any]) -> None:
-        """Have a thread call a function with a client, and fill a future."""
-        self._questions.put((question, future))
+    def ask(self, question: Callable[[Client], Any]) -> Future[Any]:
+        """Call a function with a client in another thread, one after the other."""
+        return self._answerer.submit(lambda: question(self._asked.result()))
 
     def _run(self) -> None:
         try:
-            with Client() as client:
+            with Client() as client, Client() as asked:
+                self._asked.set_result(asked)
                 self._hear_log(client)
-                # ROS starts in one thread after the other.
-                self._answerer.start()
                 while not self._ended.is_set():
                     self._watch(client)
+                asked.interrupt()
+                self._answerer.shutdown(cancel_futures=True)
         except Exception as error:  # noqa: BLE001 - the page shows it
-            self._tell({'runs': False, 'problem': str(error)})
+            self._tell_gone(error)
+            if not self._asked.done():
+                self._asked.set_exception(error)
 
     def _watch(self, client: Client) -> None:
         """Ask the system until it ends."""
@@ -210,8 +153,12 @@ class WatchedSystem(DrawnFiles):
                 self._follow(client, system, ask_status, ask_health)
         except Exception as error:  # noqa: BLE001 - the page shows it, and asks again
             self.system = None
-            self._tell({'runs': False, 'problem': str(error)})
+            self._tell_gone(error)
             self._spin(client, monotonic() + 1.0)
+
+    def _tell_gone(self, error: Exception) -> None:
+        kept = {key: self.state[key] for key in ('name', 'drawing')}
+        self.state = {**kept, 'runs': False, 'problem': str(error)}
 
     def _follow(self, client: Client, system: RunningSystem, status: Any, health: Any) -> None:
         said: dict[str, Any] = {}
@@ -226,31 +173,30 @@ class WatchedSystem(DrawnFiles):
                 if before and any(before[key] != said[key] for key in ('last_reload', 'stopped')):
                     self._draw(client, system)
                 self._find_outside(client, said)
-            self._saved.look()
+            if self._saved:
+                self._saved.look()
             try:
                 found = read_health(health(STATUS_SEC))
             except ComposerError as error:
                 # As where `diagnostics: false` measures nothing.
                 found = {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
             self._note_heard(said, found)
-            self._tell(
-                {
-                    'name': said['name'],
-                    'runs': True,
-                    'problem': found.get('problem', ''),
-                    'status': said,
-                    'health': found,
-                    'outside': self._outside.by_topic,
-                    'problems': list_problems(said, found, self._outside.by_topic, self._topics),
-                    'drawing': self.state.get('drawing', 0),
-                    'drawing_problem': self.state.get('drawing_problem', ''),
-                    'next': self._saved.next_plan,
-                }
-            )
+            outside = self._outside.by_topic
+            topics = self._declared.topic_of_ends if self._declared else {}
+            self.state = self.state | {
+                'name': said['name'],
+                'runs': True,
+                'problem': found.get('problem', ''),
+                'status': said,
+                'health': found,
+                'outside': outside,
+                'problems': list_problems(said, found, outside, topics),
+                'next': self._saved and self._saved.next_plan,
+            }
             # A silent worker takes a second of the pause: the others do not seem old for it.
             self._spin(client, max(begun + found['period_sec'] / 2, monotonic() + _POLL_SEC))
             idle_until = monotonic() + _IDLE_SEC
-            while not self.is_looked_at() and monotonic() < idle_until:
+            while self.looked_at + _LOOK_SEC < monotonic() < idle_until:
                 self._spin(client, monotonic() + _POLL_SEC)
 
     def _note_heard(self, said: dict[str, Any], found: dict[str, Any]) -> None:
@@ -273,10 +219,9 @@ class WatchedSystem(DrawnFiles):
             given = answer_forms.read_answer(text, answer_forms.SNAPSHOT)['given']
             file = Path((system.status or {}).get('file', ''))
             paths = [file, *(Path(each) for each in given['layers'])]
-            self._saved.follow(text, paths, given['words'], given['set_values'])
+            self._saved = SavedFiles(text, paths, given['words'], given['set_values'])
             self._declared = draw_files(paths, given['words'], given['set_values'])
-            self._topics = self._declared.topic_of_ends
-        except (ComposerError, DrawingError) as error:
+        except ComposerError as error:
             # The page is for the same computer as the files, and shows the rest without.
             self._declared, problem = None, str(error)
         self._outside.forget()
@@ -286,15 +231,15 @@ class WatchedSystem(DrawnFiles):
         if (drawing := self._declared) is not None:
             own = {*said['nodes'], *said['components'], *drawing.nodes}
             if self._outside.look(client.node, drawing.topics, own):
-                self._show(self.state.get('drawing_problem', ''))
+                self._show()
 
-    def _show(self, problem: str) -> None:
-        self.drawing = self._declared
+    def _show(self, problem: str = '') -> None:
         outside = self._outside.by_topic
+        self.drawing = self._declared
         if self._declared is not None and outside:
             self.drawing = self._declared.with_outside(outside)
-        number = self.state.get('drawing', 0) + 1
-        self._tell({**self.state, 'drawing': number, 'drawing_problem': problem})
+        number = self.state['drawing'] + 1
+        self.state = self.state | {'drawing': number, 'drawing_problem': problem}
 
     def _hear_log(self, client: Client) -> None:
         from rcl_interfaces.msg import Log
@@ -319,20 +264,3 @@ class WatchedSystem(DrawnFiles):
         """Hear what comes for a while."""
         while monotonic() < until and not self._ended.is_set():
             client.executor.spin_once(timeout_sec=_POLL_SEC)
-
-    def _answer(self) -> None:
-        with Client() as client:
-            while not self._ended.is_set():
-                with suppress(Empty):
-                    question, future = self._questions.get(timeout=_POLL_SEC)
-                    # Who asked may have given up while others were answered.
-                    if not future.set_running_or_notify_cancel():
-                        continue
-                    try:
-                        future.set_result(question(client))
-                    except Exception as error:  # noqa: BLE001 - it is told to who asked
-                        future.set_exception(error)
-
-    def _tell(self, state: dict[str, Any]) -> None:
-        self.state = state
-        self.changed()

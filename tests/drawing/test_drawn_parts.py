@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from composer.page.drawn_parts import describe_drawing
+from composer.page.drawn_parts import Drawing
 
 EVIL = '</script><script>alert(1)</script><!-- <script> \u2028 ]]> @script@'
 SYSTEM = f"""
@@ -34,7 +34,7 @@ SYSTEM = f"""
 
 @pytest.fixture
 def data(draw, needs_graphviz):
-    return as_json(describe_drawing(draw(SYSTEM)))
+    return as_json(Drawing(draw(SYSTEM)).shown)
 
 
 def as_json(data):
@@ -47,7 +47,6 @@ def ids_of(drawing):
 
 def test_texts_of_the_file_are_no_markup(data):
     assert data['parts']['n0']['facts'] == [EVIL]
-    assert data['description'] == EVIL
     tags = {each.tag.rpartition('}')[2] for each in ET.fromstring(data['svg']).iter()}
     assert tags <= {'svg', 'g', 'path', 'polygon', 'polyline', 'ellipse', 'text', 'title'}
 
@@ -111,7 +110,7 @@ def test_lines_that_a_setting_or_another_file_adds_are_shown_too(draw, needs_gra
     setting = 'nodes.ear.log_level=debug'
     # In a line with the number of one of those in the first file.
     layer = '#\n' * 13 + 'nodes: {ear: {use_sim_time: true}}\n'
-    data = as_json(describe_drawing(draw(SYSTEM, setting, layer=layer)))
+    data = as_json(Drawing(draw(SYSTEM, setting, layer=layer)).shown)
     first, *added = data['parts']['n1']['excerpts']
     assert first['file'] == 'robot.yaml'
     assert sorted((each['file'], each['first'], each['lines']) for each in added) == [
@@ -130,7 +129,7 @@ def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
             publishers: {"out_{{ i }}": std_msgs/msg/String}
             subscriptions: {in: {topic: "out_{{ (i + 3) % 10 }}", type: std_msgs/msg/String, publish: "out_{{ i }}"}}
     """
-    ids = ids_of(describe_drawing(draw(text)))
+    ids = ids_of(Drawing(draw(text)).shown)
     assert sum(bool(re.fullmatch(r'n\d+', each)) for each in ids if each) == 200
     assert sum(bool(re.fullmatch(r'e\d+', each)) for each in ids if each) == 400
 
@@ -156,7 +155,7 @@ FOLDABLE = """
     ids=str,
 )
 def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, boxes, lines):
-    data = as_json(describe_drawing(draw(FOLDABLE), folded=folded))
+    data = as_json(Drawing(draw(FOLDABLE)).fold(folded))
     parts, drawn = data['parts'], ids_of(data)
     shown = {token: data['stands_in'].get(token, token) for token in parts}
     assert set(shown.values()) <= drawn

@@ -107,7 +107,7 @@ def page_command(  # noqa: PLR0913 - one for each option
     the text of the files. If only one system runs, it need not be named. Only this computer can
     open it, by the address that is printed.
     """
-    from composer.page.serve import PageOptions, serve
+    from composer.page.server import PageOptions, serve
 
     is_name = len(words) == 1 and not set_values and not words[0].endswith(('.yaml', '.yml'))
     paths, arguments = ([], []) if is_name or not words else split_words(words)
