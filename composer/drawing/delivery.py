@@ -19,7 +19,7 @@ from composer.language.qos_conflicts import find_qos_conflicts
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from composer.checks.connections.topology import Channel, Endpoint
     from composer.language.specs import QosSpec
@@ -59,64 +59,33 @@ def deliveries_of(
     Args:
         profiles: The named profiles of the file.
     """
-    if channel.kind == 'topic':
-        yield from _of_topic(channel, profiles)
-    else:
-        yield from _of_calls(channel, profiles)
-
-
-def _of_topic(
-    channel: Channel, profiles: Mapping[str, QosSpec]
-) -> Iterator[tuple[DataPath, Delivery]]:
+    is_topic = channel.kind == 'topic'
     policies = {end.path: _policies_of(end, profiles) for end in channel.ends}
-    heard: dict[DataPath, list[Delivery]] = {end.path: [] for end in channel.users}
-    for publisher in channel.providers:
-        offered = policies[publisher.path]
-        matched = [each for each in channel.users if _matches(publisher, each, offered, policies)]
+    senders, receivers = channel.providers, channel.users
+    if not is_topic:
+        senders, receivers = receivers, senders
+    heard: dict[DataPath, list[Delivery]] = {end.path: [] for end in receivers}
+    for sender in senders:
+        matched = [end for end in receivers if not is_topic or _matches(sender, end, policies)]
+        ends = (sender, *matched)
+        # A call goes to one server.
+        goes_outside = getattr(sender.entity, 'external', False) and (is_topic or not matched)
         reasons = [
-            *(why_crossing(publisher, each) for each in matched),
-            '' if getattr(publisher.entity, 'local_delivery', True) else _TURNED_OFF,
-            *(_why_sent(policies[each.path]) for each in (publisher, *matched)),
-            PROCESS if any(each.is_declared for each in (publisher, *matched)) else '',
-            OUTSIDE if getattr(publisher.entity, 'external', False) else '',
+            *(why_crossing(sender, end) for end in matched),
+            *('' if getattr(end.entity, 'local_delivery', True) else _TURNED_OFF for end in ends),
+            *(why_sent(known) for end in ends if (known := policies[end.path])),
+            PROCESS if any(end.is_declared for end in ends) else '',
+            'several servers' if not is_topic and len(matched) > 1 else '',
+            OUTSIDE if goes_outside else '',
         ]
-        found = _delivery(reasons) if matched or reasons[-1] else Delivery()
-        for each in matched:
-            heard[each.path].append(found)
-        yield publisher.path, found
-    for end in channel.users:
+        reason = next(filter(None, reasons), '')
+        delivery = Delivery('sent' if reason else 'local', reason)
+        delivery = delivery if matched or goes_outside else Delivery()
+        for end in matched:
+            heard[end.path].append(delivery)
+        yield sender.path, delivery
+    for end in receivers:
         yield end.path, _join(heard[end.path])
-
-
-def _of_calls(
-    channel: Channel, profiles: Mapping[str, QosSpec]
-) -> Iterator[tuple[DataPath, Delivery]]:
-    served = [_why_call_is_sent(end, profiles) for end in channel.providers]
-    if len(channel.providers) > 1:
-        served = ['several servers']
-    called: list[Delivery] = []
-    for client in channel.users:
-        if not channel.providers:
-            outside = getattr(client.entity, 'external', False)
-            yield client.path, Delivery('sent', OUTSIDE) if outside else Delivery()
-            continue
-        elsewhere = [why_crossing(client, each) for each in channel.providers]
-        called.append(_delivery([*elsewhere, _why_call_is_sent(client, profiles), *served]))
-        yield client.path, called[-1]
-    for server in channel.providers:
-        yield server.path, _join(called)
-
-
-def _why_call_is_sent(end: Endpoint, profiles: Mapping[str, QosSpec]) -> str:
-    if end.is_declared:
-        return PROCESS
-    if not getattr(end.entity, 'local_delivery', True):
-        return _TURNED_OFF
-    return _why_sent(_policies_of(end, profiles)) if end.qos else ''
-
-
-def _why_sent(policies: Mapping[str, Any] | None) -> str:
-    return '' if policies is None else why_sent(policies)
 
 
 def _policies_of(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any] | None:
@@ -130,19 +99,13 @@ def _policies_of(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, An
 def _matches(
     publisher: Endpoint,
     subscription: Endpoint,
-    offered: Mapping[str, Any] | None,
     policies: Mapping[DataPath, Mapping[str, Any] | None],
 ) -> bool:
-    requested = policies[subscription.path]
+    offered, requested = policies[publisher.path], policies[subscription.path]
     if publisher.entity.type != subscription.entity.type or offered is None or requested is None:
         return False
     settled = settle_best_available(offered, BEST_OF_PUBLISHERS)
     return not any(find_qos_conflicts(settled, requested))
-
-
-def _delivery(reasons: Iterable[str]) -> Delivery:
-    reason = next(filter(None, reasons), '')
-    return Delivery('sent' if reason else 'local', reason)
 
 
 def _join(deliveries: list[Delivery]) -> Delivery:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import groupby, islice
 from typing import TYPE_CHECKING
 
 from composer.confidential import may_show_lines
@@ -49,23 +50,24 @@ class Excerpts:
         key = self._positions.key(path)
         spans = [span for at, span in self._spans[path[:_NODE]] if at[: len(path)] == path]
         last = _last_line(key, spans)
-        found = [self._excerpt(key.source, range(key.line, last + 1))]
+        shown = [(key.source, [*range(key.line, last + 1)])]
         elsewhere: dict[SourceFile, set[int]] = defaultdict(set)
         for span in spans:
             if span.source is not key.source or not key.line <= span.line <= last:
                 elsewhere[span.source].add(span.line)
-        found = found if may_show_lines(key.source.name) else []
         for source, numbers in elsewhere.items():
-            if may_show_lines(source.name):
-                found += [self._excerpt(source, run) for run in _runs(sorted(numbers))]
-        return found[:_MOST_EXCERPTS]
+            # Successive lines are as far from their places in the list.
+            runs = groupby(enumerate(sorted(numbers)), lambda each: each[1] - each[0])
+            shown += [(source, [number for _, number in run]) for _, run in runs]
+        found = (self._excerpt(*each) for each in shown if may_show_lines(each[0].name))
+        return [*islice(found, _MOST_EXCERPTS)]
 
-    def _excerpt(self, source: SourceFile, numbers: range) -> Excerpt:
+    def _excerpt(self, source: SourceFile, numbers: list[int]) -> Excerpt:
         name = relative_path(source.name) if source.home is None else source.name
         if source.home is not None and (source, 1) in self._masked:
             name = f'{name.partition("=")[0]}=…'
         lines = (self._masked.get((source, each), source.line(each)) for each in numbers)
-        return Excerpt(name, numbers.start, tuple(lines))
+        return Excerpt(name, numbers[0], tuple(lines))
 
     def _mask_environments(self) -> Iterator[tuple[tuple[SourceFile, int], str]]:
         """Yield the lines with environment variables of processes, without their values."""
@@ -100,15 +102,3 @@ def _last_line(key: Span, spans: Iterable[Span]) -> int:
         number += 1
         last = number if text.strip() else last
     return last
-
-
-def _runs(numbers: Iterable[int]) -> Iterator[range]:
-    start = end = 0
-    for number in numbers:
-        if number != end:
-            if start:
-                yield range(start, end)
-            start = number
-        end = number + 1
-    if start:
-        yield range(start, end)

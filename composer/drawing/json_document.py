@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 _VERSION = 1
 
 
-def render_picture(picture: Picture) -> str:
+def render_json(picture: Picture) -> str:
     """Return a picture as one JSON document."""
     return json.dumps(describe_picture(picture), indent=2) + '\n'
 
@@ -65,33 +65,24 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
         attributes = {name: getattr(part, name) for name in names.split()}
         return attributes | more | {'file': file, 'line': span.line}
 
+    def describe_edge(edge: Edge) -> dict[str, Any]:
+        names = 'id role name node channel type qos by_parameter findings'
+        ways = dict(zip(('from', 'to'), edge.ends, strict=True))
+        delivery = {'delivery': edge.delivery.way, 'delivery_reason': edge.delivery.reason}
+        return describe(edge, names, **ways, **delivery)
+
+    about_nodes = 'id kind name namespace description findings'
+    about_channels = 'id kind name types external findings'
     return {
         'version': _VERSION,
         'name': picture.name,
         'description': picture.description,
         'nodes': [
-            describe(
-                node,
-                'id kind name namespace description findings',
-                host=node.place[0],
-                worker=node.place[1],
-            )
+            describe(node, about_nodes, host=node.place[0], worker=node.place[1])
             for node in picture.nodes
         ],
-        'channels': [
-            describe(channel, 'id kind name types external findings')
-            for channel in picture.channels
-        ],
-        'edges': [
-            describe(
-                edge,
-                'id role name node channel type qos by_parameter findings',
-                **dict(zip(('from', 'to'), edge.ends, strict=True)),
-                delivery=edge.delivery.way,
-                delivery_reason=edge.delivery.reason,
-            )
-            for edge in picture.edges
-        ],
+        'channels': [describe(channel, about_channels) for channel in picture.channels],
+        'edges': [describe_edge(edge) for edge in picture.edges],
         'waits': [
             describe(wait, node=wait.waiter, **{'for': wait.target}) for wait in picture.waits
         ],

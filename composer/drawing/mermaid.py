@@ -5,7 +5,6 @@ Source: https://mermaid.js.org/syntax/flowchart.html
 
 from __future__ import annotations
 
-from itertools import count
 from typing import TYPE_CHECKING
 
 from composer.drawing.shapes import arrange_shapes
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.drawing.picture import Picture
-    from composer.drawing.shapes import Line, Region, Shape
+    from composer.drawing.shapes import Region, Shape
 
 _SHAPES = {
     'node': ('([', '])'),
@@ -40,41 +39,34 @@ _LINE_STYLES = {
 _PLAIN = frozenset(" _/.,:()=+-'")
 
 
-def render_picture(picture: Picture) -> str:
+def render_mermaid(picture: Picture) -> str:
     """Return a picture as a flowchart."""
     drawn = arrange_shapes(picture)
-    lines = ['flowchart LR', *_region(drawn.root, 1, count())]
-    lines += [f'  {_line(line)}' for line in drawn.lines]
+    lines = ['flowchart LR', *_region(drawn.root, 1)]
+    for line in drawn.lines:
+        text = f'|"{label}"|' if (label := _label(line)) else ''
+        lines.append(f'  {line.start} {_ARROWS[line.kind]}{text} {line.end}')
     marked = [(index, line.mark) for index, line in enumerate(drawn.lines) if line.mark]
     lines += [f'  linkStyle {index} {_LINE_STYLES[mark]}' for index, mark in marked]
     lines += [f'  {each}' for each in _CLASSES]
     return '\n'.join(lines) + '\n'
 
 
-def _region(region: Region, depth: int, numbers: count[int]) -> Iterator[str]:
+def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
     for shape in region.shapes:
-        yield f'{indent}{_shape(shape)}'
+        opening, closing = _SHAPES[shape.kind]
+        style = f'{closing}:::{shape.mark or shape.kind}'
+        yield f'{indent}{shape.token}{opening}"{_label(shape)}"{style}'
     for inner in region.inner.values():
-        yield f'{indent}subgraph s{next(numbers)}["{_escape(inner.title)}"]'
-        yield from _region(inner, depth + 1, numbers)
+        yield f'{indent}subgraph {inner.token}["{_escape(inner.title)}"]'
+        yield from _region(inner, depth + 1)
         yield f'{indent}end'
 
 
-def _shape(shape: Shape) -> str:
-    opening, closing = _SHAPES[shape.kind]
-    text = _label((shape.title, *shape.details, *shape.remarks))
-    return f'{shape.token}{opening}"{text}"{closing}:::{shape.mark or shape.kind}'
-
-
-def _line(line: Line) -> str:
-    text = _label((*line.details, *line.remarks))
-    label = f'|"{text}"|' if text else ''
-    return f'{line.start} {_ARROWS[line.kind]}{label} {line.end}'
-
-
-def _label(lines: tuple[str, ...]) -> str:
-    return '<br/>'.join(map(_escape, lines))
+def _label(shape: Shape) -> str:
+    titles = (shape.title,) if shape.title else ()
+    return '<br/>'.join(map(_escape, (*titles, *shape.details, *shape.remarks)))
 
 
 def _escape(text: str) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from itertools import count
+from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.checks.placement.crossings import describe_place, place_of
@@ -163,14 +165,11 @@ class Picture:
 
     def tokens(self) -> dict[str, str]:
         """Return short names of the parts by their ids: no keyword of a language is like them."""
-        kinds: tuple[tuple[str, Sequence[Box | Edge]], ...] = (
-            ('n', self.nodes),
-            ('c', self.channels),
-            ('e', self.edges),
-        )
+        kinds: dict[str, Sequence[Box | Edge]]
+        kinds = {'n': self.nodes, 'c': self.channels, 'e': self.edges}
         return {
             part.id: f'{letter}{index}'
-            for letter, parts in kinds
+            for letter, parts in kinds.items()
             for index, part in enumerate(parts)
         }
 
@@ -203,11 +202,10 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
     """
     if isinstance(value, str):
         if value not in shown:
-            text = concealed = conceal(value)
-            number = 1
-            while text != value and text in shown.values():
-                number += 1
-                text = f'{concealed} {number}'
+            text = conceal(value)
+            if text != value and text in shown.values():
+                numbered = (f'{text} {number}' for number in count(2))
+                text = next(each for each in numbered if each not in shown.values())
             shown[value] = text
         return shown[value]
     if isinstance(value, tuple):
@@ -253,21 +251,24 @@ def _specs(
 def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
     for channel in topology.channels.values():
         ends = channel.ends
-        sides: list[Side] = []
-        if any(getattr(end.entity, 'external', False) for end in channel.users):
-            sides.append('providers')
-        if any(getattr(end.entity, 'external', False) for end in channel.providers):
-            sides.append('users')
+        sides: dict[Side, list[Endpoint]] = {
+            'providers': channel.users,
+            'users': channel.providers,
+        }
         yield Box(
             f'{channel.kind}:{channel.name}',
             channel.kind,
             channel.name,
-            _common_namespace([end.node.namespace for end in ends]),
+            commonpath(f'/{end.node.namespace.strip("/")}' for end in ends),
             _common_place([place_of(end) for end in ends]),
             ends[0].path,
             places.of((channel.kind, channel.name)),
             types=tuple(dict.fromkeys(end.entity.type for end in ends)),
-            external=tuple(sides),
+            external=tuple(
+                side
+                for side, others in sides.items()
+                if any(getattr(end.entity, 'external', False) for end in others)
+            ),
         )
 
 
@@ -276,15 +277,6 @@ def _common_place(places: Sequence[Place]) -> Place:
     if len(hosts) > 1:
         return '', ''
     return hosts.pop(), workers.pop() if len(workers) == 1 else ''
-
-
-def _common_namespace(namespaces: Sequence[str]) -> str:
-    common: list[str] = []
-    for parts in zip(*(each.strip('/').split('/') for each in namespaces), strict=False):
-        if len({*parts}) > 1:
-            break
-        common.append(parts[0])
-    return '/' + '/'.join(common)
 
 
 def _edges(
@@ -298,10 +290,11 @@ def _edges(
             node = ids[boxed]
             inner = '' if boxed == end.node.path else str(end.node.path[-1])
             owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
+            noun = end.kind.noun
             followed = getattr(end.entity, 'by_parameter', {})
             yield Edge(
-                f'{end.kind.noun}:{owner}:{end.entity.name}',
-                _role(end),
+                f'{noun}:{owner}:{end.entity.name}',
+                f'{noun} server' if noun == channel.kind else noun,
                 sends(channel.kind, provides=end.kind.provides),
                 end.entity.name,
                 node,
@@ -331,10 +324,6 @@ def _differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -
 def sends(channel: str, *, provides: bool) -> bool:
     """Return whether an end sends: publishers send messages, and clients requests and goals."""
     return provides == (channel == 'topic')
-
-
-def _role(end: Endpoint) -> str:
-    return f'{end.kind.noun} server' if end.kind.noun == end.kind.channel else end.kind.noun
 
 
 def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) -> Iterator[Wait]:

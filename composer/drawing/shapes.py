@@ -8,6 +8,7 @@ from __future__ import annotations
 import textwrap
 from collections import Counter, defaultdict
 from dataclasses import field, replace
+from itertools import count
 from typing import TYPE_CHECKING
 
 from composer.drawing.delivery import OUTSIDE
@@ -66,43 +67,37 @@ class Region:
     """A namespace, a host or a worker, with the shapes in it that are in no deeper region.
 
     Attributes:
-        place: `host NAME` or `worker NAME`; empty for a namespace.
         id: The keys of all regions down to it, as in `box:/worker camera/left`.
+        kind: `namespace`, `host` or `worker`.
+        title: Its printable name; a namespace in full.
     """
 
-    namespace: str
+    token: str = ''
+    id: str = 'box:'
+    kind: str = 'namespace'
+    title: str = '/'
     shapes: list[Shape] = field(default_factory=list)
     inner: dict[str, Region] = field(default_factory=dict)
-    place: str = ''
-    id: str = 'box:'
 
-    @property
-    def title(self) -> str:
-        """Its name as it is shown."""
-        return escape(self.place or self.namespace)
+    def below(self, place: Place, namespace: str, numbers: Iterator[int]) -> Region:
+        """Return the region of a host, a worker and a namespace; add those that are missing.
 
-    @property
-    def kind(self) -> str:
-        """Return `namespace`, `host` or `worker`."""
-        return self.place.partition(' ')[0] or 'namespace'
-
-    def at(self, place: Place) -> Region:
-        """Return the region of a host and a worker below this one; add it if it is missing."""
+        Args:
+            numbers: For their tokens.
+        """
+        # No part of a namespace has a space.
+        places = zip(('host', 'worker'), place, strict=True)
+        keys = [(noun, f'{noun} {name}', f'{noun} {name}') for noun, name in places if name]
+        full = ''
+        for part in filter(None, namespace.split('/')):
+            full += f'/{part}'
+            keys.append(('namespace', part, full))
         region = self
-        for noun, name in zip(('host', 'worker'), place, strict=True):
-            if name:
-                # No part of a namespace has a space.
-                key = f'{noun} {name}'
-                inner = Region(self.namespace, place=key, id=f'{region.id}/{key}')
-                region = region.inner.setdefault(key, inner)
-        return region
-
-    def within(self, namespace: str) -> Region:
-        """Return the region of a namespace below this one; add it if it is missing."""
-        region = self
-        for part in (part for part in namespace.split('/') if part):
-            full = f'{region.namespace.rstrip("/")}/{part}'
-            region = region.inner.setdefault(part, Region(full, id=f'{region.id}/{part}'))
+        for kind, key, title in keys:
+            if key not in region.inner:
+                token, id_ = f'g{next(numbers)}', f'{region.id}/{key}'
+                region.inner[key] = Region(token, id_, kind, escape(title))
+            region = region.inner[key]
         return region
 
     def walk(self) -> Iterator[Region]:
@@ -121,14 +116,14 @@ class Arrangement:
     """All shapes and lines; shapes without a namespace are in `root` itself.
 
     Attributes:
-        regions: All regions, also those that are in a folded one, by their tokens.
+        regions: All regions, also those that are in a folded one.
         stands_in: The token of what is drawn for each shape and line that is not drawn itself.
     """
 
     root: Region
     lines: tuple[Line, ...]
-    regions: dict[str, Region] = field(default_factory=dict)
-    stands_in: dict[str, str] = field(default_factory=dict)
+    regions: tuple[Region, ...]
+    stands_in: dict[str, str]
 
 
 def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
@@ -138,12 +133,12 @@ def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangemen
         picture: What is drawn.
         folded: The ids of regions that are drawn as one shape.
     """
-    root = Region('/')
-    tokens, marks = picture.tokens(), _marks(picture)
+    root = Region()
+    tokens, marks, numbers = picture.tokens(), _marks(picture), count()
     for box in (*picture.nodes, *picture.channels):
         details = tuple(map(escape, box.types))
         shape = Shape(tokens[box.id], box.id, box.kind, escape(box.name), details, *marks[box.id])
-        root.at(box.place).within(box.namespace).shapes.append(shape)
+        root.below(box.place, box.namespace, numbers).shapes.append(shape)
     lines = [_line(edge, tokens, *marks[edge.id]) for edge in picture.edges]
     for channel in picture.channels:
         for side in channel.external:
@@ -156,9 +151,7 @@ def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangemen
     for index, wait in enumerate(picture.waits):
         start, end = tokens[wait.target], tokens[wait.waiter]
         lines.append(Line(f'w{index}', '', 'wait', details=('before',), start=start, end=end))
-    regions = {f'g{index}': region for index, region in enumerate(root.walk())}
-    drawn = Arrangement(root, tuple(lines), regions)
-    return _fold(drawn, {edge.id: edge.role for edge in picture.edges}, folded)
+    return _fold(root, lines, {edge.id: edge.role for edge in picture.edges}, folded)
 
 
 def _line(edge: Edge, tokens: dict[str, str], remarks: tuple[str, ...], mark: str) -> Line:
@@ -199,8 +192,9 @@ def _marks(picture: Picture) -> dict[str, tuple[tuple[str, ...], str]]:
     return marks
 
 
-def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) -> Arrangement:
-    tokens = {region.id: token for token, region in drawn.regions.items()}
+def _fold(
+    root: Region, unfolded: Sequence[Line], roles: dict[str, str], folded: Collection[str]
+) -> Arrangement:
     stands_in: dict[str, str] = {}
 
     def copy(region: Region) -> Region:
@@ -210,15 +204,15 @@ def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) ->
             if inner.id not in folded:
                 open_ones[key] = copy(inner)
                 continue
-            token, hidden = tokens[inner.id], inner.all_shapes()
-            shapes.append(_folded_shape(token, inner, hidden))
-            stands_in.update(dict.fromkeys((shape.token for shape in hidden), token))
-            stands_in.update(dict.fromkeys((tokens[each.id] for each in inner.walk()), token))
+            hidden = inner.all_shapes()
+            shapes.append(_folded_shape(inner, hidden))
+            inside: list[Shape | Region] = [*hidden, *inner.walk()]
+            stands_in.update((part.token, inner.token) for part in inside)
         return replace(region, shapes=shapes, inner=open_ones)
 
-    root = copy(drawn.root)
+    drawn = copy(root)
     bundles: dict[tuple[str, str, str], list[Line]] = defaultdict(list)
-    for line in drawn.lines:
+    for line in unfolded:
         start, end = (stands_in.get(token, token) for token in (line.start, line.end))
         if start == end:
             stands_in[line.token] = start
@@ -240,12 +234,12 @@ def _fold(drawn: Arrangement, roles: dict[str, str], folded: Collection[str]) ->
             )
             stands_in.update({each.token: line.token for each in bundle})
         lines.append(line)
-    return Arrangement(root, tuple(lines), drawn.regions, stands_in)
+    return Arrangement(drawn, tuple(lines), tuple(root.walk()), stands_in)
 
 
-def _folded_shape(token: str, region: Region, hidden: Sequence[Shape]) -> Shape:
+def _folded_shape(region: Region, hidden: Sequence[Shape]) -> Shape:
     details = count_kinds(shape.kind for shape in hidden if shape.kind != 'external')
-    return Shape(token, region.id, 'folded', region.title, details, mark=_worst(hidden))
+    return Shape(region.token, region.id, 'folded', region.title, details, mark=_worst(hidden))
 
 
 def _worst(parts: Sequence[Shape]) -> str:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.diagnostics import relative_path
-from composer.drawing import svg
 from composer.drawing.excerpts import Excerpts
+from composer.drawing.graphviz import render_svg
 from composer.drawing.json_document import describe_finding
 from composer.drawing.shapes import arrange_shapes, count_kinds
 from composer.entity_kinds import CHANNEL_KINDS
@@ -78,7 +78,7 @@ class Drawing:
         topic_of_ends: The topic of each publisher and subscription, by the ids of these.
 
     Raises:
-        DrawingError: Graphviz is missing or failed.
+        ComposerError: Graphviz is missing or failed.
     """
 
     def __init__(
@@ -124,8 +124,7 @@ class Drawing:
 
     def _describe(self, folded: Collection[str]) -> dict[str, Any]:
         documents = {
-            each: _inlined(svg.render_picture(self._picture, folded, each))
-            for each in self._directions
+            each: _inlined(render_svg(self._picture, folded, each)) for each in self._directions
         }
         self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
         drawn = arrange_shapes(self._picture, folded)
@@ -151,7 +150,7 @@ def _shrinkage(document: str) -> float:
 
 def _describe(picture: Picture, drawn: Arrangement) -> dict[str, Any]:
     parts = dict(_parts(picture))
-    parts |= {token: _box(region, drawn, parts) for token, region in drawn.regions.items()}
+    parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
     parts |= dict(_bundles(drawn, parts))
     owners: dict[int, str] = {}
     for token, part in parts.items():

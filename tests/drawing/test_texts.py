@@ -10,6 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from composer.drawing import render_picture
+from composer.drawing.graphviz import lay_out
+from composer.errors import ComposerError
 from composer.yaml_text.writer import render_yaml
 
 SYSTEM = """
@@ -37,11 +39,11 @@ def test_mermaid(draw):
         '  n2(["alone"]):::node',
         '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system subscribes<br/>to \'/lonely\'"]:::warning',
         '  xc1u(("external")):::external',
-        '  subgraph s0["/robot"]',
+        '  subgraph g0["/robot"]',
         '    n1(["mapper"]):::node',
         '    c0["/robot/front/scan<br/>std_msgs/msg/String"]:::topic',
         '    c1["/robot/map<br/>std_msgs/msg/String"]:::topic',
-        '    subgraph s1["/robot/front"]',
+        '    subgraph g1["/robot/front"]',
         '      n0(["lidar"]):::node',
         '    end',
         '  end',
@@ -65,8 +67,8 @@ def test_dot(draw):
     lines = [line.strip() for line in render_picture(draw(SYSTEM), 'dot').splitlines()]
     assert [line.partition(' [')[0] for line in lines] == [
         'digraph "robot" {',
-        *('graph', 'node', 'edge', 'n2', 'c2', 'xc1u', 'subgraph cluster_0 {', 'graph'),
-        *('n1', 'c0', 'c1', 'subgraph cluster_1 {', 'graph', 'n0', '}', '}'),
+        *('graph', 'node', 'edge', 'n2', 'c2', 'xc1u', 'subgraph cluster_g0 {', 'graph'),
+        *('n1', 'c0', 'c1', 'subgraph cluster_g1 {', 'graph', 'n0', '}', '}'),
         *('n0 -> c0', 'c0 -> n1', 'n1 -> c1', 'n2 -> c2', 'c1 -> xc1u', 'n1 -> n2', '}'),
     ]
     assert lines[4] == (
@@ -171,25 +173,21 @@ def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
 
 
 def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):
-    from composer.drawing.svg import DrawingError
-
     monkeypatch.setattr('shutil.which', lambda name: None)
     monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
-    with pytest.raises(DrawingError, match='laid out by Graphviz, which is not') as caught:
+    with pytest.raises(ComposerError, match='laid out by Graphviz, which is not') as caught:
         render_picture(draw(SYSTEM), 'svg')
     assert "pip install 'rclpy-composer[graph]'" in caught.value.help
 
 
 def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
-    from composer.drawing.svg import DrawingError, lay_out
-
     program = tmp_path / 'dot'
     program.write_text(
         '#!/bin/sh\necho "<svg></svg>"; echo "Warning: no" >&2; echo "out of paper" >&2; exit 3\n'
     )
     program.chmod(0o755)
     monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
-    with pytest.raises(DrawingError, match='Graphviz failed with code 3: out of paper'):
+    with pytest.raises(ComposerError, match='Graphviz failed with code 3: out of paper'):
         lay_out('digraph {}')
 
 

@@ -11,7 +11,7 @@ from composer.application.launch_file import relocate
 from composer.application.output import show_findings, write_file
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
-from composer.drawing import DEFAULT_FORMAT, FORMATS, format_of, render_picture
+from composer.drawing import FORMATS, format_of, render_picture
 from composer.drawing.picture import build_picture
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -39,10 +39,10 @@ def graph(
         output: The file to write; `None` for standard output.
 
     Raises:
-        DrawingError: The format needs Graphviz, which is missing or failed.
         UsageError: The arguments or `--set` do not fit the file, or no format has the suffix of
             `output`.
-        ComposerError: The drawing cannot be written.
+        ComposerError: The format needs Graphviz, which is missing or failed, or the drawing cannot
+            be written.
     """
     format_name = format_name or _format_of(output)
     system = load_given(paths, words, set_values, is_shown=True)
@@ -62,10 +62,9 @@ def graph(
 
 
 def _format_of(output: Path | None) -> str:
-    if output is None:
-        return DEFAULT_FORMAT
-    name = format_of(output.suffix)
+    suffix = output.suffix if output else ''
+    name = format_of(suffix)
     if name is None:
-        message = f"no format has the suffix '{output.suffix}'"
+        message = f"no format has the suffix '{suffix}'"
         raise UsageError(message, help=f'choose one with --format: {", ".join(FORMATS)}')
     return name

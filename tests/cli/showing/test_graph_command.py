@@ -85,8 +85,8 @@ def test_a_drawing_that_cannot_be_written_is_said(robot, capsys):
 
 
 def test_without_graphviz_it_ends_with_1_and_mermaid_still_works(robot, capsys, monkeypatch):
-    monkeypatch.setattr('composer.drawing.svg.shutil.which', lambda name: None)
-    monkeypatch.setattr('composer.drawing.svg.importlib.util.find_spec', lambda name: None)
+    monkeypatch.setattr('composer.drawing.graphviz.shutil.which', lambda name: None)
+    monkeypatch.setattr('composer.drawing.graphviz.importlib.util.find_spec', lambda name: None)
     words = ['graph', 'robot.yaml', 'name:=arm', '--format']
     assert run([*words, 'svg']) == 1
     assert capsys.readouterr().err == (

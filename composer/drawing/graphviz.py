@@ -1,0 +1,211 @@
+"""A picture in the language of Graphviz, and as SVG, laid out by Graphviz.
+
+That is the program `dot`, or the library in pygraphviz. Either runs in a process of its own, where
+it can be stopped, and a crash does no harm.
+
+Source: https://graphviz.org/doc/info/lang.html, https://graphviz.org/doc/info/shapes.html#html
+"""
+
+from __future__ import annotations
+
+import html
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+from composer.drawing.shapes import arrange_shapes
+from composer.errors import ComposerError
+from composer.terminal import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from composer.drawing.picture import Picture
+    from composer.drawing.shapes import Region, Shape
+
+_FONT = 'Helvetica,Arial,sans-serif'
+_SHAPES = {
+    'node': 'shape=ellipse, style=filled, fillcolor="#ddf4ff", color="#0969da"',
+    'process': 'shape=component, style=filled, fillcolor="#eaeef2", color="#57606a"',
+    'topic': 'shape=box, style="rounded,filled", fillcolor="#f6f8fa", color="#8c959f"',
+    'service': 'shape=hexagon, style=filled, fillcolor="#fbefff", color="#8250df"',
+    'action': 'shape=octagon, style=filled, fillcolor="#dafbe1", color="#1a7f37"',
+    'external': 'shape=ellipse, style=dashed, color="#8c959f", fontcolor="#57606a"',
+    'folded': 'shape=box3d, margin="0.2,0.06", style=filled, fillcolor="#eaeef2", color="#57606a"',
+}
+_LINES = {
+    'topic': 'color="#57606a"',
+    'service': 'color="#8250df"',
+    'action': 'color="#1a7f37"',
+    'external': 'color="#8c959f", style=dashed',
+    'wait': 'color="#8c959f", style=dotted',
+}
+_MARKS = {
+    'error': 'color="#d1242f", penwidth=2.5',
+    'warning': 'color="#bf8700", penwidth=2.5',
+}
+_MARK_COLOURS = {'error': '#d1242f', 'warning': '#9a6700'}
+_REGIONS = {
+    'namespace': 'style="rounded,dashed", color="#8c959f"',
+    'worker': 'style=rounded, color="#0969da", penwidth=1.5',
+    'host': 'style="rounded,bold", color="#57606a", penwidth=2',
+}
+# Texts beside arrows need room along them.
+_RANK_SEPARATIONS = {'LR': 0.7, 'TB': 0.3}
+_SMALL, _GREY = 9, '#57606a'
+# Graphviz would look for the best layout of more nodes for minutes: 1,000 that share a topic take
+# four seconds so.
+_MOST_NODES = 150
+_HURRIED = 'splines=line, nslimit=0.5, nslimit1=0.5, mclimit=0.05, '
+_LIMIT_SEC = 120.0
+_WITH_LIBRARY = (
+    'import sys, pygraphviz\n'
+    'graph = pygraphviz.AGraph(string=sys.stdin.buffer.read().decode())\n'
+    "sys.stdout.buffer.write(graph.draw(format='svg', prog='dot'))\n"
+)
+_MISSING_HELP = (
+    "install it (pip install 'rclpy-composer[graph]', or Graphviz, the package graphviz of your "
+    'system); mermaid, dot and json need none'
+)
+_COMMENT = re.compile(r'<!--.*?-->\n?', re.DOTALL)
+_TITLE = re.compile(r'(<g id="([^"]*)"[^>]*>\n)<title>[^<]*</title>\n')
+
+
+def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
+    """Return a picture as a directed graph; each element has an `id` and a `class` for SVG.
+
+    Args:
+        picture: What is drawn.
+        folded: See `arrange_shapes`.
+        direction: Of messages, as Graphviz names it: `LR` or `TB`.
+    """
+    drawn = arrange_shapes(picture, folded)
+    separation, fonts = _RANK_SEPARATIONS[direction], f'fontname="{_FONT}", fontsize=11'
+    hurry = _HURRIED if len(picture.nodes) > _MOST_NODES else ''
+    lines = [
+        f'digraph {_quote(picture.name)} {{',
+        f'  graph [{hurry}rankdir={direction}, ranksep={separation}, nodesep=0.2, {fonts}]',
+        f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
+        f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
+        *_region(drawn.root, 1),
+        *(f'  {line.start} -> {line.end} {_look(line, _LINES)}' for line in drawn.lines),
+        '}',
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def _region(region: Region, depth: int) -> Iterator[str]:
+    indent = '  ' * depth
+    for shape in region.shapes:
+        yield f'{indent}{shape.token} {_look(shape, _SHAPES)}'
+    for inner in region.inner.values():
+        yield f'{indent}subgraph cluster_{inner.token} {{'
+        yield (
+            f'{indent}  graph [label=<{_text(inner.title)}>, id="{inner.token}", '
+            f'class="{inner.kind}", labeljust=l, {_REGIONS[inner.kind]}]'
+        )
+        yield from _region(inner, depth + 1)
+        yield f'{indent}}}'
+
+
+def _look(shape: Shape, styles: Mapping[str, str]) -> str:
+    """Return the attributes of a shape or a line."""
+    lines = [f'<B>{_text(shape.title)}</B>'] if shape.title else []
+    lines += [_font(line, _GREY) for line in shape.details]
+    lines += [_font(line, _MARK_COLOURS.get(shape.mark, _GREY)) for line in shape.remarks]
+    attributes = [
+        f'label=<{"<BR/>".join(lines)}>' if lines else '',
+        styles[shape.kind],
+        _MARKS.get(shape.mark, ''),
+        f'id="{shape.token}"',
+        f'class="{shape.kind} {shape.mark}"' if shape.mark else f'class="{shape.kind}"',
+    ]
+    return f'[{", ".join(filter(None, attributes))}]'
+
+
+def _font(line: str, colour: str) -> str:
+    return f'<FONT POINT-SIZE="{_SMALL}" COLOR="{colour}">{_text(line)}</FONT>'
+
+
+def _text(text: str) -> str:
+    # A backslash begins an escape in these labels, too.
+    text = text.replace('\\', '\\\\')
+    return html.escape(text)
+
+
+def _quote(text: str) -> str:
+    escaped = text.replace('\\', '\\\\').replace('"', '\\"').replace('\n', ' ')
+    return f'"{escaped}"'
+
+
+def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
+    """Return a picture as an SVG document.
+
+    Args:
+        picture: What is drawn.
+        folded: See `arrange_shapes`.
+        direction: See `render_dot`.
+
+    Raises:
+        ComposerError: Graphviz is missing or failed.
+    """
+    drawn = _COMMENT.sub('', lay_out(render_dot(picture, folded, direction)))
+    titles = dict(_titles(picture))
+
+    def entitle(match: re.Match[str]) -> str:
+        title = titles.get(match[2])
+        return f'{match[1]}<title>{html.escape(title)}</title>\n' if title else match[1]
+
+    return _TITLE.sub(entitle, drawn).rstrip() + '\n'
+
+
+def _titles(picture: Picture) -> Iterator[tuple[str, str]]:
+    """Yield the token of each part, and its tooltip."""
+    tokens = picture.tokens()
+    titles = {box.id: box.title for box in (*picture.nodes, *picture.channels)}
+    facts = {box.id: ', '.join(box.types) for box in picture.channels}
+    for edge in picture.edges:
+        titles[edge.id] = f'{edge.role} {edge.name} of {titles[edge.node]}'
+        facts[edge.id] = ', '.join(filter(None, (edge.type, edge.policies)))
+    for part in picture.parts:
+        title = ': '.join(filter(None, (titles[part.id], facts.get(part.id))))
+        said = [picture.findings[index].message for index in part.findings]
+        yield tokens[part.id], '\n'.join(map(escape, [title, *said]))
+
+
+def lay_out(text: str) -> str:
+    """Return a text in the DOT language as an SVG document.
+
+    Raises:
+        ComposerError: Graphviz is missing or failed.
+    """
+    try:
+        done = subprocess.run(  # noqa: S603 - the program is Graphviz, the text its input
+            _command(), input=text.encode(), capture_output=True, timeout=_LIMIT_SEC, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        message = f'Graphviz found no layout in {_LIMIT_SEC:g} s'
+        raise ComposerError(message, help='draw it as dot, and lay that out otherwise') from error
+    except OSError as error:
+        message = f'cannot run Graphviz: {error.strerror}'
+        raise ComposerError(message, help=_MISSING_HELP) from error
+    svg = done.stdout.decode(errors='replace')
+    if done.returncode or '</svg>' not in svg:
+        said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
+        message = f'Graphviz failed with code {done.returncode}: {said}'
+        raise ComposerError(message)
+    return svg
+
+
+def _command() -> list[str]:
+    program = shutil.which('dot')
+    if program:
+        return [program, '-Tsvg']
+    if importlib.util.find_spec('pygraphviz'):
+        # -P: import nothing from the working folder.
+        return [sys.executable, '-P', '-c', _WITH_LIBRARY]
+    message = 'svg and pages are laid out by Graphviz, which is not installed'
+    raise ComposerError(message, help=_MISSING_HELP)
