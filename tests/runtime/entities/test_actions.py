@@ -1,7 +1,9 @@
 """Actions that systems serve: how each goal ends, under each rule, for a plain rclpy client."""
 
+import os
 import signal
 from collections import Counter
+from contextlib import ExitStack, closing
 
 import pytest
 
@@ -13,7 +15,7 @@ from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
 from test_msgs.action import Fibonacci
 
-from tests.running import DEADLINE_SEC
+from tests.running import DEADLINE_SEC, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -24,12 +26,9 @@ STATUS = {
 }
 
 CODE = """
-import threading
 import time
 
 from composer import AbortedError
-
-released = threading.Event()
 
 def plain(node, goal):
     return [goal.order]
@@ -110,22 +109,12 @@ async def accept_async(node, goal):
     return accept(node, goal)
 
 def short(node, goal):
-    node.state.running += 1
-    node.state.most = max(node.state.most, node.state.running)
     for _ in range(3):
         yield [goal.order]
         time.sleep(0.002)
-    node.state.running -= 1
     return [goal.order]
 """
 
-SYSTEM = """
-    version: 1
-    nodes:
-      server:
-        state: {running: 0, most: 0}
-        actions:
-"""
 KINDS = [
     'plain',
     'coroutine',
@@ -151,12 +140,13 @@ def serving(actions):
         f"          {name}: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:{behaviour}'{more}}}"
         for name, (behaviour, more) in actions.items()
     ]
-    return SYSTEM + '\n'.join(lines) + '\n'
+    head = 'version: 1\nnodes:\n      server:\n        actions:\n'
+    return head + '\n'.join(lines) + '\n'
 
 
 def by_rule(behaviour):
-    """Return an action for each rule, with the name of the rule."""
-    return {rule: (behaviour, f', concurrency: {rule}') for rule in RULES}
+    """Return an action for each rule, named after both."""
+    return {f'{behaviour}_{rule}': (behaviour, f', concurrency: {rule}') for rule in RULES}
 
 
 class Client:
@@ -166,9 +156,9 @@ class Client:
     asked for after it has sent it.
     """
 
-    def __init__(self, peer, name, wait_for):
+    def __init__(self, peer, name):
         deep = QoSProfile(depth=1000)
-        self.peer, self._wait_for = peer, wait_for
+        self.peer = peer
         self._client = peer.run(
             ActionClient,
             peer.node,
@@ -200,7 +190,7 @@ class Client:
         return self._client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=hear)
 
     def accepted(self, future):
-        self._wait_for(future.done, 'the answer to a goal')
+        wait_for(future.done, 'the answer to a goal')
         return future.result()
 
     def begin(self, order, heard=None):
@@ -212,51 +202,36 @@ class Client:
     def end(self, handle):
         """Return how a goal ended, and its result."""
         future = self.peer.run(handle.get_result_async)
-        self._wait_for(future.done, 'the result of a goal')
+        wait_for(future.done, 'the result of a goal')
         return STATUS[future.result().status], list(future.result().result.sequence)
 
     def cancel(self, handle):
         future = self.peer.run(handle.cancel_goal_async)
-        self._wait_for(future.done, 'the answer to the request to cancel')
+        wait_for(future.done, 'the answer to the request to cancel')
         return len(future.result().goals_canceling)
 
     def close(self):
         self.peer.run(self._client.destroy)
 
 
-@pytest.fixture
-def connect(peer, wait_for):
-    """Return a function that returns a client of an action."""
-    clients = []
-
-    def connect(name):
-        clients.append(Client(peer, name, wait_for))
-        return clients[-1]
-
-    yield connect
-    for client in clients:
-        client.close()
-
-
 @pytest.fixture(scope='module')
 def child(shared_compose):
-    actions = {kind: (kind, '') for kind in KINDS} | by_rule('forever')
+    actions = {
+        **{kind: (kind, '') for kind in KINDS},
+        **by_rule('forever'),
+        **{name: ('plain', f", accept: 'parts:{name}'") for name in ('accept', 'accept_async')},
+        'doomed': ('generator', ', concurrency: queue'),
+    }
     child = shared_compose(serving(actions), CODE)
     child.wait_until_ready()
     return child
 
 
 @pytest.fixture
-def shared_connect(child, shared_peer, wait_for):
-    clients = []
-
-    def connect(name):
-        clients.append(Client(shared_peer, name, wait_for))
-        return clients[-1]
-
-    yield connect
-    for client in clients:
-        client.close()
+def connect(child, shared_peer):
+    """Return a function that returns a client of an action."""
+    with ExitStack() as clients:
+        yield lambda name: clients.enter_context(closing(Client(shared_peer, name)))
 
 
 @pytest.mark.parametrize(
@@ -268,10 +243,8 @@ def shared_connect(child, shared_peer, wait_for):
         ('async_generator', [[0], [1], [2]]),
     ],
 )
-def test_a_goal_succeeds_with_its_feedback_in_order_and_its_result(
-    shared_connect, wait_for, name, feedback
-):
-    client = shared_connect(name)
+def test_a_goal_succeeds_with_its_feedback_in_order_and_its_result(connect, name, feedback):
+    client = connect(name)
     heard = []
 
     handle = client.begin(3, heard)
@@ -282,10 +255,8 @@ def test_a_goal_succeeds_with_its_feedback_in_order_and_its_result(
 
 
 @pytest.mark.parametrize('name', ['forever', 'forever_async'])
-def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(
-    child, shared_connect, wait_for, name
-):
-    client = shared_connect(name)
+def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(child, connect, name):
+    client = connect(name)
     heard = []
     order = KINDS.index(name)
     handle = client.begin(order, heard)
@@ -304,15 +275,15 @@ def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(
         ('give_up_plain', [], 'aborted a goal'),
     ],
 )
-def test_a_planned_abort_has_a_result_and_is_no_error(child, shared_connect, name, result, said):
-    client = shared_connect(name)
+def test_a_planned_abort_has_a_result_and_is_no_error(child, connect, name, result, said):
+    client = connect(name)
     assert client.end(client.begin(2)) == ('aborted', result)
     assert said in child.wait_for_line(f"[INFO] [server]: action '{name}'")
     assert not child.matching(f"action '{name}' (system.yaml")
 
 
-def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(shared_connect, wait_for):
-    client = shared_connect('interrupted')
+def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(connect):
+    client = connect('interrupted')
     heard = []
     handle = client.begin(4, heard)
     # One that has not begun is never interrupted.
@@ -336,10 +307,8 @@ def test_what_a_generator_returns_when_it_is_cancelled_is_the_result(shared_conn
         ),
     ],
 )
-def test_a_behaviour_that_raises_aborts_its_goal_and_is_in_the_log(
-    child, shared_connect, name, summary
-):
-    client = shared_connect(name)
+def test_a_behaviour_that_raises_aborts_its_goal_and_is_in_the_log(child, connect, name, summary):
+    client = connect(name)
 
     assert client.end(client.begin(1)) == ('aborted', [])
     assert summary in child.wait_for_line(f"[server]: action '{name}' (system.yaml:")
@@ -347,35 +316,94 @@ def test_a_behaviour_that_raises_aborts_its_goal_and_is_in_the_log(
         child.wait_for_line('[server]: closed')
 
 
-def test_accept_decides_about_goals(compose, connect):
-    names = ('accept', 'accept_async')
-    actions = {name: ('plain', f", accept: 'parts:{name}'") for name in names}
-    child = compose(serving(actions), CODE)
-    for name in names:
-        client = connect(name)
-        refused = f"[INFO] [server]: action '{name}' refused a goal"
+@pytest.mark.parametrize('name', ['accept', 'accept_async'])
+def test_accept_decides_about_goals(child, connect, name):
+    client = connect(name)
+    refused = f"[INFO] [server]: action '{name}' refused a goal"
 
-        assert client.end(client.begin(5)) == ('succeeded', [5])
-        assert not client.accepted(client.send(-1)).accepted
-        child.wait_for_line(refused)
-        assert not client.accepted(client.send(6)).accepted
-        child.wait_for_line(f'{refused}: 6 is more than 5')
-        assert not client.accepted(client.send(101)).accepted
-        error = child.wait_for_line(f"action '{name}' (accept) (system.yaml:")
-        assert 'OSError: cannot decide' in error
-    assert child.stop() == 0
+    assert client.end(client.begin(5)) == ('succeeded', [5])
+    assert not client.accepted(client.send(-1)).accepted
+    child.wait_for_line(refused)
+    assert not client.accepted(client.send(6)).accepted
+    child.wait_for_line(f'{refused}: 6 is more than 5')
+    assert not client.accepted(client.send(101)).accepted
+    error = child.wait_for_line(f"action '{name}' (accept) (system.yaml:")
+    assert 'OSError: cannot decide' in error
 
 
-@pytest.mark.parametrize('behaviour', ['short', 'forever'])
-def test_of_many_goals_at_once_each_ends_in_one_right_state(compose, connect, wait_for, behaviour):
-    child = compose(serving(by_rule(behaviour)), CODE)
-    for rule in RULES:
-        check_many_goals_at_once(connect(rule), rule, behaviour, wait_for)
-    assert child.stop() == 0
-    assert 'rror' not in child.output
+def test_goals_of_a_queue_run_in_order_and_one_that_waits_can_be_cancelled(connect):
+    client = connect('forever_queue')
+    heard = [[], [], []]
+    handles = [client.begin(n, heard[n]) for n in range(3)]
+    wait_for(lambda: heard[0], 'feedback of the first')
+
+    assert client.cancel(handles[1]) == 1
+    assert client.end(handles[1]) == ('canceled', [])
+    assert heard[1:] == [[], []]
+    assert client.cancel(handles[0]) == 1
+    assert client.end(handles[0]) == ('canceled', [])
+    wait_for(lambda: heard[2], 'feedback of the last')
+    assert client.cancel(handles[2]) == 1
+    assert client.end(handles[2]) == ('canceled', [])
+    assert heard[1] == []
 
 
-def check_many_goals_at_once(client, rule, behaviour, wait_for):
+def test_a_goal_is_refused_while_another_runs(connect):
+    client = connect('forever_reject')
+    first = client.begin(1)
+
+    assert not client.accepted(client.send(2)).accepted
+    assert client.cancel(first) == 1
+    assert client.end(first) == ('canceled', [])
+    last = client.begin(3)
+    assert client.cancel(last) == 1
+    assert client.end(last) == ('canceled', [])
+
+
+def test_a_new_goal_takes_the_place_of_the_one_that_runs(child, connect):
+    client = connect('forever_preempt')
+    began = []
+    first = client.begin(71, began)
+    # What has not begun has nothing to clean up.
+    wait_for(lambda: began, 'feedback of the first')
+    heard = []
+    second = client.begin(72, heard)
+
+    assert client.end(first) == ('aborted', [])
+    child.wait_for_line('cleaned up 71')
+    wait_for(lambda: heard, 'feedback of the second')
+    assert client.cancel(second) == 1
+    assert client.end(second) == ('canceled', [])
+
+
+def test_of_many_goals_each_ends_in_one_right_state_also_at_the_stop(compose, peer):
+    child = compose(serving(by_rule('short') | by_rule('forever')), CODE)
+    with ExitStack() as stack:
+        clients = {
+            (behaviour, rule): stack.enter_context(closing(Client(peer, f'{behaviour}_{rule}')))
+            for behaviour in ('short', 'forever')
+            for rule in RULES
+        }
+        for (behaviour, rule), client in clients.items():
+            check_many_goals_at_once(client, rule, behaviour)
+        heard = {rule: [] for rule in RULES}
+        results = []
+        for rule, messages in heard.items():
+            client = clients['forever', rule]
+            handles = [client.accepted(client.send(n, messages)) for n in range(5)]
+            results += [peer.run(handle.get_result_async) for handle in handles if handle.accepted]
+        # By then, the requests for results have come.
+        for messages in heard.values():
+            messages.clear()
+        wait_for(lambda: all(len(messages) > 50 for messages in heard.values()), 'feedback')
+
+        assert child.stop(signal.SIGINT) == 0
+        wait_for(lambda: all(future.done() for future in results), 'all results')
+        assert {STATUS[future.result().status] for future in results} == {'aborted'}
+        assert 'rror' not in child.output
+
+
+def check_many_goals_at_once(client, rule, behaviour):
     count = 50
     handles = client.send_all(count)
     accepted = [n for n, handle in enumerate(handles) if handle.accepted]
@@ -407,73 +435,6 @@ def check_many_goals_at_once(client, rule, behaviour, wait_for):
         assert client.end(handle)[0] == good
 
 
-def test_goals_of_a_queue_run_in_order_and_one_that_waits_can_be_cancelled(
-    shared_connect, wait_for
-):
-    client = shared_connect('queue')
-    heard = [[], [], []]
-    handles = [client.begin(n, heard[n]) for n in range(3)]
-    wait_for(lambda: heard[0], 'feedback of the first')
-
-    assert client.cancel(handles[1]) == 1
-    assert client.end(handles[1]) == ('canceled', [])
-    assert heard[1:] == [[], []]
-    assert client.cancel(handles[0]) == 1
-    assert client.end(handles[0]) == ('canceled', [])
-    wait_for(lambda: heard[2], 'feedback of the last')
-    assert client.cancel(handles[2]) == 1
-    assert client.end(handles[2]) == ('canceled', [])
-    assert heard[1] == []
-
-
-def test_a_goal_is_refused_while_another_runs(shared_connect):
-    client = shared_connect('reject')
-    first = client.begin(1)
-
-    assert not client.accepted(client.send(2)).accepted
-    assert client.cancel(first) == 1
-    assert client.end(first) == ('canceled', [])
-    last = client.begin(3)
-    assert client.cancel(last) == 1
-    assert client.end(last) == ('canceled', [])
-
-
-def test_a_new_goal_takes_the_place_of_the_one_that_runs(child, shared_connect, wait_for):
-    client = shared_connect('preempt')
-    began = []
-    first = client.begin(71, began)
-    # What has not begun has nothing to clean up.
-    wait_for(lambda: began, 'feedback of the first')
-    heard = []
-    second = client.begin(72, heard)
-
-    assert client.end(first) == ('aborted', [])
-    child.wait_for_line('cleaned up 71')
-    wait_for(lambda: heard, 'feedback of the second')
-    assert client.cancel(second) == 1
-    assert client.end(second) == ('canceled', [])
-
-
-def test_goals_in_flight_are_aborted_with_a_result_when_the_system_stops(
-    compose, peer, connect, wait_for
-):
-    child = compose(serving(by_rule('forever')), CODE)
-    heard = {rule: [] for rule in RULES}
-    results = []
-    for rule in RULES:
-        client = connect(rule)
-        handles = [client.accepted(client.send(n, heard[rule])) for n in range(5)]
-        results += [peer.run(handle.get_result_async) for handle in handles if handle.accepted]
-    # By then, the requests for results have come.
-    for messages in heard.values():
-        messages.clear()
-    wait_for(lambda: all(len(messages) > 50 for messages in heard.values()), 'feedback')
-
-    assert child.stop(signal.SIGINT) == 0
-    wait_for(lambda: all(future.done() for future in results), 'all results')
-    assert {STATUS[future.result().status] for future in results} == {'aborted'}
-
-
 # A plain client in a process of its own, which sends one goal and lives until it is killed.
 CLIENT_CODE = """
 import rclpy
@@ -482,7 +443,7 @@ from test_msgs.action import Fibonacci
 
 rclpy.init()
 node = rclpy.create_node('doomed')
-client = ActionClient(node, Fibonacci, 'generator')
+client = ActionClient(node, Fibonacci, 'doomed')
 client.wait_for_server()
 future = client.send_goal_async(Fibonacci.Goal(order=10), lambda _message: print('heard', flush=True))
 rclpy.spin_until_future_complete(node, future)
@@ -491,13 +452,14 @@ rclpy.spin(node)
 """
 
 
-def test_a_client_killed_in_mid_goal_leaves_the_server_sound(compose, connect, start_program):
-    child = compose(serving({'generator': ('generator', ', concurrency: queue')}), CODE)
-    doomed = start_program('-c', CLIENT_CODE)
+def test_a_client_killed_in_mid_goal_leaves_the_server_sound(
+    shared_compose, connect, start_program
+):
+    environment = os.environ | {'ROS_DOMAIN_ID': str(shared_compose.domain_id)}
+    doomed = start_program('-c', CLIENT_CODE, env=environment)
     assert doomed.stdout.readline() == 'heard\n'
     doomed.kill()
-    client = connect('generator')
+    client = connect('doomed')
 
     # It waits for the killed client's goal, which runs to its end.
     assert client.end(client.begin(2)) == ('succeeded', [2])
-    assert child.stop() == 0

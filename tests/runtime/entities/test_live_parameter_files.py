@@ -25,7 +25,7 @@ nodes:
   arm:
     namespace: robot
     parameter_files: [site.yaml, own.yaml]
-    parameters:
+    parameters: &parameters
       speed: {default: 1.0, maximum: 5.0, description: In m/s.}
       mode: {default: slow, choices: [slow, fast]}
       gains: [1.0]
@@ -33,6 +33,10 @@ nodes:
       sub.deep: 1
       wheels: {type: integer}
       kept: here
+  leg:
+    use_sim_time: true
+    parameter_files: [site.yaml, others.yaml]
+    parameters: *parameters
 """
 SITE = """
 /**:
@@ -47,9 +51,11 @@ robot:
   "*":
     ros__parameters: {gains: [.5, inf], mode: slow}
 """
+# Of the command line, all for one node.
+ASSIGNMENTS = ('leg:wheels:=5', 'leg:speed:=4.0', 'leg:kept:="7"')
 OTHERS = """
 /**: {ros__parameters: {use_sim_time: false}}
-robot/arm: {ros__parameters: {wheels: 4}}
+leg: {ros__parameters: {wheels: 4}}
 """
 NAMES = ['speed', 'mode', 'gains', 'names', 'sub.deep', 'wheels', 'kept', 'use_sim_time']
 
@@ -64,9 +70,10 @@ def ask(peer, node, names):
     return dict(zip(names, map(parameter_value_to_python, response.values), strict=True))
 
 
-def test_a_node_takes_the_values_that_its_files_give_it(compose, peer, tmp_path):
-    write(tmp_path, site=SITE, own=OWN)
-    child = compose(SYSTEM)
+def test_the_command_line_wins_over_files_and_files_over_keys_of_the_node(compose, peer, tmp_path):
+    write(tmp_path, site=SITE, own=OWN, others=OTHERS)
+    assignments = [part for each in ASSIGNMENTS for part in ('-p', each)]
+    child = compose(SYSTEM, '', '--ros-args', *assignments)
     child.wait_until_ready()
     assert ask(peer, '/robot/arm', NAMES) == {
         'speed': 2.0,
@@ -78,28 +85,18 @@ def test_a_node_takes_the_values_that_its_files_give_it(compose, peer, tmp_path)
         'kept': 'here',
         'use_sim_time': False,
     }
-    assert child.stop() == 0
-    assert 'undeclared-parameter' in child.output
-
-
-def test_the_command_line_wins_over_files_and_files_over_keys_of_the_node(compose, peer, tmp_path):
-    write(tmp_path, site=SITE, own=OTHERS)
-    system = SYSTEM.replace('namespace: robot', 'namespace: robot\n    use_sim_time: true')
-    child = compose(
-        system, '', '--ros-args', '-p', 'wheels:=5', '-p', 'speed:=4.0', '-p', 'kept:="7"'
-    )
-    child.wait_until_ready()
-    assert ask(peer, '/robot/arm', ['wheels', 'speed', 'kept', 'use_sim_time']) == {
+    assert ask(peer, '/leg', ['wheels', 'speed', 'kept', 'use_sim_time']) == {
         'wheels': 5,
         'speed': 4.0,
         'kept': '7',
         'use_sim_time': False,
     }
     assert child.stop() == 0
+    assert 'undeclared-parameter' in child.output
 
 
 def test_a_value_that_the_declaration_refuses_stops_the_start(compose, tmp_path):
-    write(tmp_path, site=SITE, own='/**: {ros__parameters: {speed: 9.0}}')
+    write(tmp_path, site=SITE, others=OTHERS, own='/**: {ros__parameters: {speed: 9.0}}')
     child = compose(SYSTEM)
     assert child.wait() == 1
     assert 'own.yaml:1:32: error[refused-parameter]' in child.output

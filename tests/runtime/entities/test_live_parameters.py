@@ -19,7 +19,7 @@ pytestmark = pytest.mark.ros
 SYSTEM = """
 version: 1
 nodes:
-  plain:
+  plain: &plain
     parameters:
       text: Alice
       number: 3
@@ -41,6 +41,7 @@ nodes:
       mode: {default: slow, choices: [slow, fast]}
       gear: {default: 1, choices: [1, 2, 4]}
       serial: {default: A1, read_only: true}
+  untouched: *plain
   judging:
     parameters: {limit: 1, other: a, mode: {default: slow, choices: [slow, fast]}}
     on_parameters: parts:judge
@@ -50,6 +51,9 @@ nodes:
   stumbling:
     parameters: {limit: 1}
     on_parameters: parts:stumble
+  lonely:
+    parameters: {name: Alice, keys: taken, unset: {type: integer}}
+    on_start: parts:look
 """
 
 CODE = """
@@ -71,7 +75,44 @@ async def judge_later(node, changes, bound):
 
 def stumble(node, changes):
     raise RuntimeError('no idea')
+
+def look(node):
+    parameters = node.parameters
+    log = node.logger.info
+    log(f"in: {'name' in parameters}, {'nam' in parameters}")
+    log(f"get: {parameters.get('name')}, {parameters.get('nam', 'nobody')}")
+    log(f"getattr: {getattr(parameters, 'nam', 'nobody')}")
+    log(f"keys: {parameters['keys']}, unset: {parameters.unset}")
+    log(f"size: {len(parameters) == len(list(parameters)) == len(dict(parameters))}")
+    try:
+        parameters.nam  # composer: ignore[unknown-parameter]
+    except Exception as error:
+        log(f'{type(error).__name__}: {error}; {error.help}')
 """
+# As the file gives them; the last two are what rclpy gives to every node.
+VALUES = {
+    'text': 'Alice',
+    'number': 3,
+    'ratio': 0.5,
+    'flag': False,
+    'texts': ['a', 'b'],
+    'numbers': [1, 2],
+    'ratios': [1.0, 2.5],
+    'flags': [True, False],
+    'octets': [b'\x00', b'\xff'],
+    'nothing': [],
+    'fixed': [],
+    'group.inner.deep': 1,
+    'whole': 2.0,
+    'speed': 1.0,
+    'count': 4,
+    'positive': 1,
+    'mode': 'slow',
+    'gear': 1,
+    'serial': 'A1',
+    'use_sim_time': False,
+    'start_type_description_service': False,
+}
 
 
 @pytest.fixture(scope='module')
@@ -111,80 +152,29 @@ def describe(child, shared_peer):
     return describe
 
 
-def test_all_declared_parameters_are_listed(child, shared_peer):
-    response = shared_peer.call(ListParameters, '/plain/list_parameters')
-
-    # The last two are what rclpy gives to every node.
-    assert sorted(response.result.names) == sorted(
-        [
-            'text',
-            'number',
-            'ratio',
-            'flag',
-            'texts',
-            'numbers',
-            'ratios',
-            'flags',
-            'octets',
-            'nothing',
-            'fixed',
-            'unset',
-            'group.inner.deep',
-            'whole',
-            'speed',
-            'count',
-            'positive',
-            'mode',
-            'gear',
-            'serial',
-            'use_sim_time',
-            'start_type_description_service',
-        ]
-    )
+def test_a_new_node_has_the_values_of_the_file_in_their_types(child, shared_peer):
+    listed = shared_peer.call(ListParameters, '/untouched/list_parameters').result.names
+    assert sorted(listed) == sorted([*VALUES, 'unset'])
+    response = shared_peer.call(GetParameters, '/untouched/get_parameters', names=[*VALUES])
+    got = map(parameter_value_to_python, response.values)
+    for (name, value), found in zip(VALUES.items(), got, strict=True):
+        assert type(found) is type(value) or isinstance(value, list), name
+        assert list(found) == value if isinstance(value, list) else found == value, name
 
 
-@pytest.mark.parametrize(
-    ('name', 'value'),
-    [
-        ('text', 'Alice'),
-        ('number', 3),
-        ('ratio', 0.5),
-        ('flag', False),
-        ('texts', ['a', 'b']),
-        ('numbers', [1, 2]),
-        ('ratios', [1.0, 2.5]),
-        ('flags', [True, False]),
-        ('octets', [b'\x00', b'\xff']),
-        ('nothing', []),
-        ('fixed', []),
-        ('group.inner.deep', 1),
-        ('whole', 2.0),
-        ('use_sim_time', False),
-    ],
-)
-def test_values_are_those_of_the_file(get, name, value):
-    got = get(name)
-
-    assert type(got) is type(value) or isinstance(value, list)
-    assert list(got) == value if isinstance(value, list) else got == value
-
-
-@pytest.mark.parametrize(
-    ('name', 'kind'),
-    [
-        ('text', ParameterType.PARAMETER_STRING),
-        ('ratios', ParameterType.PARAMETER_DOUBLE_ARRAY),
-        ('octets', ParameterType.PARAMETER_BYTE_ARRAY),
-        ('nothing', ParameterType.PARAMETER_STRING_ARRAY),
-        ('fixed', ParameterType.PARAMETER_DOUBLE_ARRAY),
-        ('unset', ParameterType.PARAMETER_INTEGER),
-    ],
-)
-def test_descriptors_tell_the_type_and_keep_it(describe, name, kind):
-    descriptor = describe(name)
-
-    assert (descriptor.name, descriptor.type) == (name, kind)
-    assert not descriptor.dynamic_typing
+def test_descriptors_tell_the_type_and_keep_it(describe):
+    kinds = {
+        'text': ParameterType.PARAMETER_STRING,
+        'ratios': ParameterType.PARAMETER_DOUBLE_ARRAY,
+        'octets': ParameterType.PARAMETER_BYTE_ARRAY,
+        'nothing': ParameterType.PARAMETER_STRING_ARRAY,
+        'fixed': ParameterType.PARAMETER_DOUBLE_ARRAY,
+        'unset': ParameterType.PARAMETER_INTEGER,
+    }
+    for name, kind in kinds.items():
+        descriptor = describe(name)
+        assert (descriptor.name, descriptor.type) == (name, kind)
+        assert not descriptor.dynamic_typing
 
 
 def test_descriptors_tell_range_description_choices_and_read_only(describe):
@@ -202,63 +192,62 @@ def test_descriptors_tell_range_description_choices_and_read_only(describe):
     assert not describe('text').read_only
 
 
-@pytest.mark.parametrize(
-    ('name', 'value'),
-    [
-        ('text', ''),
-        ('number', -(2**63)),
-        ('ratio', 1e308),
-        ('flag', True),
-        ('texts', ['c']),
-        ('ratios', [3.0]),
-        ('unset', 4),
-        ('speed', 1.5),
-        ('count', 10),
-        ('mode', 'fast'),
-        ('gear', 4),
-        # As in files, an integer is a double, and an empty list has the type that is declared.
-        ('ratio', 3),
-        ('ratios', [3, 4]),
-        ('nothing', []),
-        ('texts', []),
-        ('octets', []),
-    ],
-)
-def test_a_value_that_fits_is_set(change, get, describe, name, value):
-    kind = describe(name).type
-    assert change(name, value) == (True, '')
-    assert get(name) == value
-    assert describe(name).type == kind
+FITTING = [
+    ('text', ''),
+    ('number', -(2**63)),
+    ('ratio', 1e308),
+    ('flag', True),
+    ('texts', ['c']),
+    ('ratios', [3.0]),
+    ('unset', 4),
+    ('speed', 1.5),
+    ('count', 10),
+    ('mode', 'fast'),
+    ('gear', 4),
+    # As in files, an integer is a double, and an empty list has the type that is declared.
+    ('ratio', 3),
+    ('ratios', [3, 4]),
+    ('nothing', []),
+    ('texts', []),
+    ('octets', []),
+]
 
 
-@pytest.mark.parametrize(
-    ('name', 'value', 'reason'),
-    [
-        ('speed', 2.5, 'Parameter speed out of range Min: 0.0, Max: 2.0, value: 2.5'),
-        (
-            'speed',
-            0.7,
-            'The parameter value for speed is not close enough to a valid step. '
-            'Min: 0.0, max: 2.0, value: 0.7, step: 0.5',
-        ),
-        ('count', -1, 'Parameter count out of range. Min: 0, Max: 10, value: -1'),
-        ('mode', 'quick', "'quick' is not one of slow, fast"),
-        ('gear', 3, "'3' is not one of 1, 2, 4"),
-        ('fixed', [1.0], 'Trying to set a read-only parameter: fixed.'),
-        ('serial', 'B2', 'Trying to set a read-only parameter: serial.'),
-        (
-            'number',
-            'three',
-            # rclpy 9 writes the types' numbers.
-            f"Wrong parameter type, expected '{Parameter.Type.INTEGER}' got '{Parameter.Type.STRING}'",
-        ),
-    ],
-)
-def test_a_refused_value_says_why_and_changes_nothing(change, get, name, value, reason):
-    before = get(name)
+def test_a_value_that_fits_is_set(change, get, describe):
+    for name, value in FITTING:
+        kind = describe(name).type
+        assert change(name, value) == (True, ''), name
+        assert get(name) == value
+        assert describe(name).type == kind
 
-    assert change(name, value) == (False, reason)
-    assert get(name) == before
+
+REFUSED = [
+    ('speed', 2.5, 'Parameter speed out of range Min: 0.0, Max: 2.0, value: 2.5'),
+    (
+        'speed',
+        0.7,
+        'The parameter value for speed is not close enough to a valid step. '
+        'Min: 0.0, max: 2.0, value: 0.7, step: 0.5',
+    ),
+    ('count', -1, 'Parameter count out of range. Min: 0, Max: 10, value: -1'),
+    ('mode', 'quick', "'quick' is not one of slow, fast"),
+    ('gear', 3, "'3' is not one of 1, 2, 4"),
+    ('fixed', [1.0], 'Trying to set a read-only parameter: fixed.'),
+    ('serial', 'B2', 'Trying to set a read-only parameter: serial.'),
+    (
+        'number',
+        'three',
+        # rclpy 9 writes the types' numbers.
+        f"Wrong parameter type, expected '{Parameter.Type.INTEGER}' got '{Parameter.Type.STRING}'",
+    ),
+]
+
+
+def test_a_refused_value_says_why_and_changes_nothing(change, get):
+    for name, value, reason in REFUSED:
+        before = get(name)
+        assert change(name, value) == (False, reason)
+        assert get(name) == before
 
 
 def test_an_undeclared_parameter_is_refused(change):
@@ -386,20 +375,9 @@ def test_overrides_of_the_command_line_reach_the_nodes_that_they_name(compose):
     ('override', 'message'),
     [
         (
-            'first:count:=many',
-            "error: node 'first': parameter 'count' from the command line: Trying to set parameter "
-            "'count' to 'many' of type 'STRING', expecting type 'INTEGER'",
-        ),
-        (
             'first:rate:=2',
             "error: node 'first': parameter 'rate' from the command line: Trying to set parameter "
             "'rate' to '2' of type 'INTEGER', expecting type 'DOUBLE'\n  help: write 2.0",
-        ),
-        (
-            'first:count:=6',
-            "error: node 'first': parameter 'count' from the command line: "
-            'Invalid parameter value (6) for parameter. Reason: '
-            'Parameter count out of range. Min: -9223372036854775808, Max: 5, value: 6',
         ),
         (
             'first:mode:=c',
@@ -415,31 +393,7 @@ def test_a_wrong_override_ends_the_start_with_a_clear_line(compose, override, me
     assert child.lines == message.splitlines()
 
 
-def test_parameters_are_a_mapping_with_what_a_mapping_offers(compose):
-    text = """
-        version: 1
-        nodes:
-          lonely:
-            parameters: {name: Alice, keys: taken, unset: {type: integer}}
-            on_start: parts:look
-    """
-    code = """
-        def look(node):
-            parameters = node.parameters
-            log = node.logger.info
-            log(f"in: {'name' in parameters}, {'nam' in parameters}")
-            log(f"get: {parameters.get('name')}, {parameters.get('nam', 'nobody')}")
-            log(f"getattr: {getattr(parameters, 'nam', 'nobody')}")
-            log(f"keys: {parameters['keys']}, unset: {parameters.unset}")
-            log(f"size: {len(parameters) == len(list(parameters)) == len(dict(parameters))}")
-            try:
-                parameters.nam  # composer: ignore[unknown-parameter]
-            except Exception as error:
-                log(f'{type(error).__name__}: {error}; {error.help}')
-    """
-    child = compose(text, code)
-    child.wait_until_ready()
-
+def test_parameters_are_a_mapping_with_what_a_mapping_offers(child):
     assert child.matching('[lonely]') == [
         '[INFO] [lonely]: in: True, False',
         '[INFO] [lonely]: get: Alice, nobody',

@@ -9,6 +9,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Empty, SetBool, Trigger
 from test_msgs.srv import BasicTypes
 
+from tests.running import DEADLINE_SEC, wait_for
+
 pytestmark = pytest.mark.ros
 
 CODE = """
@@ -88,15 +90,44 @@ SYSTEM = """
             type: std_srvs/srv/Trigger
             behaviour: parts:as_message
             qos: {reliability: best_effort, depth: 3}
+          meet: {type: std_srvs/srv/Trigger, behaviour: 'parts:meet', group: reentrant}
+      alone:
+        state: {inside: 0}
+        timers: {tick: {period: 0.05, behaviour: 'parts:alone_in_timer'}}
+        services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:alone'}}
 """
 
 
 @pytest.fixture(scope='module')
 def child(shared_compose):
-    """Return a running system that serves all of these."""
     child = shared_compose(SYSTEM, CODE)
     child.wait_until_ready()
     return child
+
+
+@pytest.fixture
+def connect(child, shared_peer):
+    """Return a function that returns a client that the server has found."""
+    clients = []
+
+    def connect(service_class, name, **options):
+        create = shared_peer.node.create_client
+        clients.append(shared_peer.run(create, service_class, f'/robot/{name}', **options))
+        assert clients[-1].wait_for_service(DEADLINE_SEC)
+        # Ends are found in the order in which they were made: who answers this knows the client.
+        shared_peer.call(Trigger, '/robot/message')
+        return clients[-1]
+
+    yield connect
+    for client in clients:
+        shared_peer.run(shared_peer.node.destroy_client, client)
+
+
+def ask(client, requests):
+    """Send requests at once; return their responses."""
+    futures = [client.call_async(request) for request in requests]
+    wait_for(lambda: all(future.done() for future in futures), 'all responses')
+    return [future.result() for future in futures]
 
 
 def test_a_mapping_becomes_the_response(child, shared_peer):
@@ -107,14 +138,10 @@ def test_a_mapping_becomes_the_response(child, shared_peer):
     assert (no.success, no.message) == (False, 'said')
 
 
-@pytest.mark.parametrize('name', ['message', 'coroutine', 'constant'])
-def test_messages_coroutines_and_constants_become_the_response(child, shared_peer, name):
-    response = shared_peer.call(Trigger, f'/robot/{name}')
-
-    assert (response.success, response.message) == (
-        True,
-        {'coroutine': 'async'}.get(name, name),
-    )
+def test_messages_coroutines_and_constants_become_the_response(child, shared_peer):
+    for name, text in {'message': 'message', 'coroutine': 'async', 'constant': 'constant'}.items():
+        response = shared_peer.call(Trigger, f'/robot/{name}')
+        assert (response.success, response.message) == (True, text)
 
 
 def test_a_response_without_fields_is_sent(child, shared_peer):
@@ -122,25 +149,16 @@ def test_a_response_without_fields_is_sent(child, shared_peer):
     child.wait_for_line('[robot.server]: nothing to say')
 
 
-@pytest.mark.parametrize('name', ['/robot/server/own', '/moved/new_name', '/top'])
-def test_private_remapped_and_absolute_names_are_served(child, shared_peer, name):
-    assert shared_peer.call(Trigger, name).message == 'message'
+def test_private_remapped_and_absolute_names_are_served(child, shared_peer):
+    for name in ('/robot/server/own', '/moved/new_name', '/top'):
+        assert shared_peer.call(Trigger, name).message == 'message'
 
 
-def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
-    client = shared_peer.run(shared_peer.node.create_client, BasicTypes, '/robot/echo')
-    assert client.wait_for_service(30)
-    # Ends are found in the order in which they were made: who answers this knows the client.
-    shared_peer.call(Trigger, '/robot/message')
-    futures = [
-        client.call_async(BasicTypes.Request(int64_value=number, string_value=str(number)))
-        for number in range(8)
-    ]
-    wait_for(lambda: all(future.done() for future in futures), 'all responses')
-
-    answers = [(future.result().int64_value, future.result().string_value) for future in futures]
+def test_a_response_goes_to_the_request_it_is_for(connect):
+    requests = [BasicTypes.Request(int64_value=n, string_value=str(n)) for n in range(8)]
+    responses = ask(connect(BasicTypes, 'echo'), requests)
+    answers = [(response.int64_value, response.string_value) for response in responses]
     assert answers == [(number, str(number) * 2) for number in range(8)]
-    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
 @pytest.mark.parametrize(
@@ -152,11 +170,9 @@ def test_a_response_goes_to_the_request_it_is_for(child, shared_peer, wait_for):
     ],
 )
 def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
-    child, shared_peer, wait_for, name, summary, function
+    child, shared_peer, connect, name, summary, function
 ):
-    client = shared_peer.run(shared_peer.node.create_client, Trigger, f'/robot/{name}')
-    assert client.wait_for_service(30)
-    future = client.call_async(Trigger.Request())
+    future = connect(Trigger, name).call_async(Trigger.Request())
     line = child.wait_for_line(f"service '{name}'")
     # What is asked later is answered: the former answer would have come before it.
     assert shared_peer.call(Trigger, '/robot/message').success
@@ -165,15 +181,11 @@ def test_a_behaviour_that_raises_sends_no_response_and_is_in_the_log(
     assert summary in line
     assert function in child.output
     assert not future.done()
-    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
-def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for):
+def test_the_quality_of_service_is_the_declared_one(shared_peer, connect):
     profile = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
-    client = shared_peer.run(
-        shared_peer.node.create_client, Trigger, '/robot/best_effort', qos_profile=profile
-    )
-    assert client.wait_for_service(30)
+    connect(Trigger, 'best_effort', qos_profile=profile)
 
     def readers():
         found = shared_peer.node.get_subscriptions_info_by_topic(
@@ -184,41 +196,12 @@ def test_the_quality_of_service_is_the_declared_one(child, shared_peer, wait_for
     # An end may be found before the name of its node.
     theirs = wait_for(readers, 'the end of the server')
     assert [info.qos_profile.reliability for info in theirs] == [ReliabilityPolicy.BEST_EFFORT]
-    shared_peer.run(shared_peer.node.destroy_client, client)
 
 
-def test_a_service_runs_never_beside_the_nodes_other_behaviours(compose, peer):
-    text = """
-        version: 1
-        nodes:
-          server:
-            state: {inside: 0}
-            timers: {tick: {period: 0.05, behaviour: 'parts:alone_in_timer'}}
-            services: {ask: {type: std_srvs/srv/Trigger, behaviour: 'parts:alone'}}
-    """
-    child = compose(text, CODE)
-    child.wait_until_ready()
-
-    assert [peer.call(Trigger, 'ask').success for _ in range(10)] == [True] * 10
-    assert child.stop() == 0
+def test_a_service_runs_never_beside_the_nodes_other_behaviours(child, shared_peer):
+    assert [shared_peer.call(Trigger, 'ask').success for _ in range(10)] == [True] * 10
 
 
-def test_requests_of_a_reentrant_service_run_beside_each_other(compose, peer, wait_for):
-    text = """
-        version: 1
-        nodes:
-          server:
-            services:
-              meet: {type: std_srvs/srv/Trigger, behaviour: 'parts:meet', group: reentrant}
-              other: {type: std_srvs/srv/Trigger, behaviour: 'parts:as_message'}
-    """
-    child = compose(text, CODE)
-    client = peer.run(peer.node.create_client, Trigger, 'meet')
-    assert client.wait_for_service(30)
-    # Ends are found in the order in which they were made: who answers this knows the client.
-    peer.call(Trigger, 'other')
-    futures = [client.call_async(Trigger.Request()) for _ in range(2)]
-    wait_for(lambda: all(future.done() for future in futures), 'both responses')
-
-    assert [future.result().success for future in futures] == [True, True]
-    assert child.stop() == 0
+def test_requests_of_a_reentrant_service_run_beside_each_other(connect):
+    client = connect(Trigger, 'meet')
+    assert [response.success for response in ask(client, [Trigger.Request()] * 2)] == [True, True]

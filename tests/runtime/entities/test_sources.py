@@ -1,21 +1,20 @@
 """Sources: threads of their own call what blocks, publish what it gives, and end with their node."""
 
 import json
-import re
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from tests.running import wait_for
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from std_msgs.msg import String
 
 pytestmark = pytest.mark.ros
 
 # A pipe stands for a port: who reads it waits until somebody writes.
 PARTS = """
 import os
-
-import port
 
 
 def begin(node):
@@ -60,142 +59,150 @@ async def late(node):
 
 def hear(node, message):
     node.logger.info(f'heard {message.data}')
-"""
-SYSTEM = {
-    'version': 1,
-    'executor': {'shutdown_timeout': 20},
-    'nodes': {
-        'driver': {
-            'state': {'reading': 0, 'writing': 0},
-            'publishers': {'raw': 'std_msgs/msg/String', 'other': 'std_msgs/msg/String'},
-            'on_start': 'parts:begin',
-            'subscriptions': {
-                'feed': {'type': 'std_msgs/msg/String', 'behaviour': 'parts:feed'},
-            },
-            'sources': {},
-        },
-        'ear': {
-            'subscriptions': {
-                'raw': {'type': 'std_msgs/msg/String', 'behaviour': 'parts:hear'},
-            },
-        },
-    },
-}
-FEED = """
+
 
 def feed(node, message):
     os.write(node.state.writing, message.data.encode())
+
+
+def tick(node):
+    node.sleep(0.05)
+    node.logger.info('ticks')
 """
+_STRING = 'std_msgs/msg/String'
 
 
-@pytest.fixture
-def run(compose):
-    """Return a function that runs the system with a source, and one that writes another."""
+def driver(**source):
+    """Return a node with a source that reads a port."""
+    return {
+        'state': {'reading': 0, 'writing': 0},
+        'publishers': {
+            name: {'type': _STRING, 'topic': f'~/{name}', 'external': True}
+            for name in ('raw', 'other')
+        },
+        'on_start': 'parts:begin',
+        'subscriptions': {
+            'feed': {
+                'type': _STRING,
+                'topic': '~/feed',
+                'behaviour': 'parts:feed',
+                'external': True,
+            },
+        },
+        'sources': {'port': {'publish': 'raw', 'cancel': 'parts:cancel', **source}},
+    }
 
-    def write(**source):
-        data = json.loads(json.dumps(SYSTEM))
-        data['nodes']['driver']['sources'] = {'port': source} if source else {}
-        data['nodes']['driver']['subscriptions']['feed']['external'] = True
-        path = compose.folder / 'system.yaml'
-        (compose.folder / 'new').write_text(json.dumps(data))
-        (compose.folder / 'new').replace(path)
 
-    def start(*options, **source):
-        write(**source)
-        (compose.folder / 'parts.py').write_text(PARTS.replace('\nimport port\n', '') + FEED)
-        child = compose.run('system.yaml', *options)
-        child.wait_until_ready()
-        return child, write
-
-    return start
+def ear(*names):
+    """Return a node that hears what others publish."""
+    return {
+        'subscriptions': {
+            name: {'type': _STRING, 'topic': f'/{name}/raw', 'behaviour': 'parts:hear'}
+            for name in names
+        }
+    }
 
 
-def publish(peer):
-    from std_msgs.msg import String
+def render(nodes):
+    return json.dumps({'version': 1, 'executor': {'shutdown_timeout': 20}, 'nodes': nodes})
 
-    publisher = peer.advertise(String, '/feed')
+
+def heard(child, *texts):
+    return [
+        text
+        for line in child.matching('heard ')
+        if (text := line.rpartition('heard ')[2]) in texts
+    ]
+
+
+def connect(peer, name):
+    """Return a function that writes to the port of a driver."""
+    publisher = peer.advertise(String, f'/{name}/feed')
     return lambda text: publisher.publish(String(data=text))
 
 
-def test_what_is_read_is_published(run, peer):
-    child, _ = run(behaviour='parts:read', publish='raw', cancel='parts:cancel')
-    feed = publish(peer)
+def test_what_sources_give_is_published_and_they_rest_with_their_nodes(compose, peer):
+    nodes = {
+        'reads': driver(behaviour='parts:read'),
+        'ends': driver(behaviour='parts:few'),
+        'fails': driver(behaviour='parts:steps'),
+        'rests': {
+            'lifecycle': {'start': 'inactive'},
+            'sources': {'tick': {'behaviour': 'parts:tick'}},
+        },
+        'ear': ear('reads', 'ends', 'fails'),
+    }
+    child = compose(render(nodes), PARTS)
+    child.wait_until_ready()
+
+    feed = connect(peer, 'reads')
     for text in ('a', '.', 'b'):
         feed(text)
         child.wait_for_line(f'read {text}')
     child.wait_for_line('heard b')
-    assert child.stop() == 0, child.output
-    heard = [line.rpartition(' ')[2] for line in child.matching('heard')]
-    assert heard == ['a', 'b']
+    assert heard(child, 'a', 'b', '.') == ['a', 'b']
 
-
-def test_a_generator_ends_where_it_returns(run):
-    child, _ = run(behaviour='parts:few', publish='raw')
+    # A generator ends where it returns.
     child.wait_for_line('heard last')
-    assert child.stop() == 0, child.output
-    assert [re.search('heard .*', line)[0] for line in child.matching('heard')] == [
-        'heard one',
-        'heard last',
-    ]
+    assert heard(child, 'one', 'last') == ['one', 'last']
 
-
-def test_after_an_error_it_begins_again_and_health_tells(run, peer, compose):
-    child, _ = run(behaviour='parts:steps', publish='raw', cancel='parts:cancel')
-    feed = publish(peer)
+    # After an error it begins again, and health tells.
+    feed = connect(peer, 'fails')
     feed('!')
     child.wait_for_line("source 'port'")
     assert child.matching('unplugged')
     assert child.matching('closed step 1')
     feed('a')
     child.wait_for_line('heard step 1')
-    assert child.stop() == 0, child.output
-    assert len(child.matching('closed step ')) == 2
-
-
-@pytest.mark.parametrize('behaviour', ['parts:read', 'parts:steps'])
-def test_edits_end_what_blocks_and_begin_it_anew(run, peer, behaviour):
-    source = {'behaviour': behaviour, 'publish': 'raw', 'cancel': 'parts:cancel'}
-    child, write = run('--watch', **source)
-    feed = publish(peer)
-    for number in range(20):
-        write(**source, **{'with': {'word': f'w{number}'}})
-        child.wait_for_line('reloaded in', times=number + 1)
-    # What is published by another one is no reason to begin anew.
-    write(**source | {'publish': 'other'}, **{'with': {'word': 'w19'}})
-    child.wait_for_line('reloaded in', times=21)
-    closed = len(child.matching('closed'))
-    assert closed in (0, 20)
-    write(**source, **{'with': {'word': 'w19'}})
-    child.wait_for_line('reloaded in', times=22)
-    feed('a')
-    child.wait_for_line('w19')
-    assert len(child.matching('closed')) == closed
-    write()
-    child.wait_for_line('reloaded in', times=23)
-    assert child.stop() == 0, child.output
-
-
-def test_it_rests_with_its_node(compose, peer):
-    from lifecycle_msgs.msg import Transition
-    from lifecycle_msgs.srv import ChangeState
-
-    code = 'def tick(node):\n    node.sleep(0.05)\n    node.logger.info("ticks")\n'
-    text = """
-version: 1
-nodes: {driver: {lifecycle: {start: inactive}, sources: {tick: {behaviour: 'parts:tick'}}}}
-"""
-    child = compose(text, code)
-    child.wait_until_ready()
-
-    def change(transition):
-        fields = {'transition': Transition(id=transition)}
-        assert peer.call(ChangeState, '/driver/change_state', **fields).success
 
     for _ in range(2):
         before = len(child.matching('ticks'))
-        change(Transition.TRANSITION_ACTIVATE)
-        wait_for(lambda n=before: len(child.matching('ticks')) > n + 1, child)
-        change(Transition.TRANSITION_DEACTIVATE)
+        change(peer, Transition.TRANSITION_ACTIVATE)
+        child.wait_for_line('ticks', times=before + 2)
+        change(peer, Transition.TRANSITION_DEACTIVATE)
+    assert child.stop() == 0, child.output
+    assert len(child.matching('closed step ')) == 2
+    assert heard(child, 'one', 'last') == ['one', 'last']
+
+
+def change(peer, transition):
+    fields = {'transition': Transition(id=transition)}
+    assert peer.call(ChangeState, '/rests/change_state', **fields).success
+
+
+def test_edits_end_what_blocks_and_begin_it_anew(compose, peer):
+    reloads = 0
+
+    def edit(**source):
+        nonlocal reloads
+        names = ('read', 'steps')
+        nodes = {name: driver(behaviour=f'parts:{name}', **source) for name in names}
+        if not source:
+            for node in nodes.values():
+                del node['sources']
+        (compose.folder / 'new').write_text(render(nodes | {'ear': ear(*names)}))
+        (compose.folder / 'new').replace(compose.folder / 'system.yaml')
+        if reloads:
+            child.wait_for_line('reloaded in', times=reloads)
+        reloads += 1
+
+    (compose.folder / 'parts.py').write_text(PARTS)
+    edit(publish='raw')
+    child = compose.run('system.yaml', '--watch')
+    child.wait_until_ready()
+    feeds = [connect(peer, name) for name in ('read', 'steps')]
+    for number in range(20):
+        edit(**{'with': {'word': f'w{number}'}})
+    # What is published by another one is no reason to begin anew.
+    edit(publish='other', **{'with': {'word': 'w19'}})
+    assert len(child.matching('closed')) == 20
+    edit(**{'with': {'word': 'w19'}})
+    for feed in feeds:
+        feed('a')
+    child.wait_for_line('[read]: w19 a')
+    child.wait_for_line('heard w19 1')
+    assert len(child.matching('closed')) == 20
+    edit()
     assert child.stop() == 0, child.output
 
 

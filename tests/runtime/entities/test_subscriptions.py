@@ -29,9 +29,26 @@ nodes:
       twist: {type: geometry_msgs/msg/Twist, publish: relayed}
       point: {type: std_msgs/msg/Int32, behaviour: 'parts:to_point', publish: single}
       finding: {type: std_msgs/msg/Int32, behaviour: 'parts:to_words', publish: wrong}
+  best:
+    subscriptions:
+      spoken:
+        type: std_msgs/msg/String
+        qos: best_available
+        behaviour: parts:shout
+        with: {suffix: ''}
+  mouth:
+    publishers: {spoken: {type: std_msgs/msg/String, qos: sensor_data}}
+    timers: {speak: {period: 0.05, publish: spoken, message: hello}}
+  patient:
+    state: {started: false}
+    subscriptions: {early: {type: std_msgs/msg/Int32, behaviour: 'parts:hear_early'}}
+    on_start: parts:start
 """
 
 CODE = """
+import time
+from pathlib import Path
+
 from rclpy.task import Future
 
 def shout(node, message, suffix):
@@ -48,12 +65,27 @@ def to_point(node, message):
 
 def to_words(node, message):
     return 'three'  # composer: ignore[field-type]
+
+def start(node):
+    node.logger.info('starting')
+    while not Path('published').exists():
+        time.sleep(0.01)
+    time.sleep(0.1)
+    node.state.started = True
+
+def hear_early(node, message):
+    node.logger.info(f'heard {message.data}, started: {node.state.started}')
 """
 
 
 @pytest.fixture(scope='module')
-def child(shared_compose):
+def child(shared_compose, shared_peer):
     child = shared_compose(SYSTEM, CODE)
+    child.wait_for_line('starting')
+    publisher = shared_peer.advertise(Int32, 'early')
+    for number in range(3):
+        publisher.publish(Int32(data=number))
+    (shared_compose.folder / 'published').touch()
     child.wait_until_ready()
     return child
 
@@ -123,55 +155,12 @@ def test_a_payload_of_another_type_is_an_error_that_names_field_and_types(child,
     assert "'three'" in line
 
 
-def test_messages_that_come_before_the_start_is_over_wait_for_it(compose, peer):
-    text = """
-        version: 1
-        nodes:
-          patient:
-            state: {started: false}
-            subscriptions:
-              early: {type: std_msgs/msg/Int32, behaviour: 'parts:hear'}
-            on_start: parts:start
-    """
-    code = """
-        import time
-        from pathlib import Path
-
-        def start(node):
-            node.logger.info('starting')
-            while not Path('published').exists():
-                time.sleep(0.01)
-            time.sleep(0.1)
-            node.state.started = True
-
-        def hear(node, message):
-            node.logger.info(f'heard {message.data}, started: {node.state.started}')
-    """
-    child = compose(text, code)
-    child.wait_for_line('starting')
-    publisher = peer.advertise(Int32, 'early')
-    for number in range(3):
-        publisher.publish(Int32(data=number))
-    (compose.folder / 'published').touch()
-
-    child.wait_for_line('heard 2')
-    assert child.matching('heard') == [
+def test_messages_that_come_before_the_start_is_over_wait_for_it(child):
+    child.wait_for_line('[patient]: heard 2')
+    assert child.matching('[patient]: heard') == [
         f'[INFO] [patient]: heard {number}, started: True' for number in range(3)
     ]
 
 
-def test_the_best_available_qos_fits_publishers_of_nodes_that_stand_below(compose):
-    text = """
-        version: 1
-        nodes:
-          ears:
-            subscriptions:
-              word: {type: std_msgs/msg/String, qos: best_available, behaviour: 'parts:shout'}
-          mouth:
-            publishers:
-              word: {type: std_msgs/msg/String, qos: sensor_data}
-            timers:
-              speak: {period: 0.05, publish: word, message: hello}
-    """
-    child = compose(text, CODE.replace('suffix)', "suffix='')"))
-    child.wait_for_line('heard String hello')
+def test_the_best_available_qos_fits_publishers_of_nodes_that_stand_below(child):
+    child.wait_for_line('[best]: heard String hello')

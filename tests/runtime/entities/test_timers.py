@@ -35,9 +35,16 @@ nodes:
       steady: {period: 0.05, clock: steady, behaviour: 'parts:tick', with: {clock: steady}}
       system: {period: 0.05, clock: system, behaviour: 'parts:tick', with: {clock: system}}
       by_name: {period: 0.05, behaviour: 'parts:by_name'}
+    on_start: parts:wait_for_peer
+  slow:
+    timers:
+      step: {period: 0.02, behaviour: 'parts:step', group: reentrant}
+      step_async: {period: 0.02, behaviour: 'parts:step_async', group: reentrant}
 """
 
 KINDS_CODE = """
+import time
+
 from rclpy.task import Future
 
 def count(node):
@@ -74,6 +81,24 @@ def by_name(node):
         node.publish('by_nam', 'hello')  # composer: ignore[unknown-publisher]
     except Exception as error:
         node.logger.info(f'{type(error).__name__}: {error}; {error.help}')
+
+def step(node):
+    for number in range(4):
+        node.logger.info(f'step {number}')
+        time.sleep(0.1)
+        yield
+
+async def step_async(node):
+    for number in range(4):
+        node.logger.info(f'async step {number}')
+        time.sleep(0.1)
+        yield
+
+def wait_for_peer(node):
+    # The generators publish a few messages only, so their publishers must know of the peer before.
+    while not all(each.get_subscription_count() for each in node.ros.publishers
+                  if 'generated' in each.topic_name):
+        time.sleep(0.01)
 """
 
 
@@ -89,19 +114,8 @@ def heard(shared_compose, shared_peer):
         'silent': Int32,
         'by_name': String,
     }
-    # The generators publish a few messages only, so their publishers must know of the peer before.
-    code = (
-        KINDS_CODE
-        + """
-def wait_for_peer(node):
-    import time
-    while not all(p.get_subscription_count() for p in node.ros.publishers if 'g' in p.topic_name
-                  and 'generated' in p.topic_name):
-        time.sleep(0.01)
-"""
-    )
     lists = {topic: shared_peer.listen(kind, topic, 1000) for topic, kind in classes.items()}
-    child = shared_compose(f'{KINDS}    on_start: parts:wait_for_peer\n', code)
+    child = shared_compose(KINDS, KINDS_CODE)
     child.wait_until_ready()
     return lists, child
 
@@ -158,9 +172,9 @@ def test_none_publishes_nothing(heard, wait_for):
     assert messages['silent'] == []
 
 
-@pytest.mark.parametrize('clock', ['steady', 'system'])
-def test_a_timer_ticks_by_the_clock_that_it_names(heard, clock):
-    heard[1].wait_for_line(f'{clock} tick', times=3)
+def test_a_timer_ticks_by_the_clock_that_it_names(heard):
+    for clock in ('steady', 'system'):
+        heard[1].wait_for_line(f'{clock} tick', times=3)
 
 
 def test_publish_by_name_reaches_what_is_declared_and_names_what_is_near(heard, wait_for):
@@ -204,35 +218,10 @@ def test_simulated_time_drives_ros_timers_and_no_others(compose, peer, wait_for)
     assert child.stop() == 0
 
 
-def test_a_generator_never_overlaps_itself_even_in_a_reentrant_group(compose):
-    text = """
-        version: 1
-        nodes:
-          slow:
-            timers:
-              step: {period: 0.02, behaviour: 'parts:step', group: reentrant}
-              step_async: {period: 0.02, behaviour: 'parts:step_async', group: reentrant}
-    """
-    code = """
-        import time
-
-        def step(node):
-            for number in range(4):
-                node.logger.info(f'step {number}')
-                time.sleep(0.1)
-                yield
-
-        async def step_async(node):
-            for number in range(4):
-                node.logger.info(f'async step {number}')
-                time.sleep(0.1)
-                yield
-    """
-    child = compose(text, code)
+def test_a_generator_never_overlaps_itself_even_in_a_reentrant_group(heard):
+    _, child = heard
     child.wait_for_line(']: step 3')
     child.wait_for_line(']: async step 3')
-
-    assert child.stop() == 0
     assert not child.matching('raised')
     for kind in ('step', 'async step'):
         steps = [line for line in child.lines if f']: {kind} ' in line]
