@@ -9,12 +9,18 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from composer.application.file_selection import load_given
+from composer.checks.absent_packages import AbsentPackages
+from composer.checks.checker import check_in_context, create_context
 from composer.diagnostics import relative_path
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.graphviz import render_svg
 from composer.drawing.json_document import describe_finding
+from composer.drawing.picture import build_picture
 from composer.drawing.shapes import arrange_shapes, count_kinds
 from composer.entity_kinds import CHANNEL_KINDS
+from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.bindings import node_bindings
 from composer.python_source.modules import ModuleSource
 
@@ -38,7 +44,24 @@ _STAGE = 680, 850
 _MOST_FOLDED = 16
 
 
-def list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
+def draw_files(
+    paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
+) -> Drawing:
+    """Return the drawing of a system with its findings.
+
+    Raises:
+        ComposerError: The files cannot be read, or there is no Graphviz.
+    """
+    system = load_given(paths, words, set_values, is_shown=True)
+    context = create_context(system, InterfaceCatalogue())
+    findings = AbsentPackages().leave_out(check_in_context(system, context))
+    if context is None:
+        texts = [f'{each.span or each.file}: {each.message}' for each in findings]
+        raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
+    return Drawing(build_picture(context, findings), _list_code(context))
+
+
+def _list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
     """Return the behaviours of each node with the lines of their functions, by its full name."""
     return {
         node.full_name: [
@@ -67,7 +90,7 @@ class Drawing:
     """A system as it is drawn, as a whole and with folded boxes.
 
     Args:
-        code: See `list_code`.
+        code: The behaviours of each node, by its full name, with the lines of their functions.
         direction: `LR` or `TB`; empty for the one that is read with less zooming.
 
     Attributes:

@@ -14,6 +14,7 @@ import sys
 import threading
 import webbrowser
 from contextlib import aclosing, suppress
+from functools import partial
 from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
@@ -48,7 +49,7 @@ except ImportError as error:
     raise ComposerError(message, help="pip install 'rclpy-composer[page]'") from error
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+    from collections.abc import AsyncIterator, Callable, Sequence
 
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -207,9 +208,9 @@ class PageServer:
                 Route('/api/events', self._events),
                 Route('/api/drawing', self._drawing),
                 Route('/api/log', self._log),
-                Route('/api/parameters', self._asking(list_parameters, 'node')),
-                Route('/api/message', self._asking(look_at_message, 'topic')),
-                Route('/api/template', self._asking(show_template, 'kind', 'name')),
+                Route('/api/parameters', partial(self._question, list_parameters)),
+                Route('/api/message', partial(self._question, look_at_message)),
+                Route('/api/template', partial(self._question, show_template)),
                 Route('/api/act', self._act, methods=['POST']),
                 Route('/{name}', self._asset),
             ]
@@ -291,16 +292,9 @@ class PageServer:
         number = int(after) if after.isdecimal() and len(after) < _MOST_DIGITS else 0
         return _json([each for each in list(self._source.log) if each['number'] > number])
 
-    def _asking(
-        self, question: Callable[..., Any], *names: str
-    ) -> Callable[[Request], Awaitable[Response]]:
-        """Return what asks the graph, with values of the address."""
-
-        async def asking(request: Request) -> Response:
-            values = [request.query_params.get(name, '') for name in names]
-            return await self._ask(lambda client: question(client, *values))
-
-        return asking
+    async def _question(self, question: Callable[..., Any], request: Request) -> Response:
+        """Ask the graph, with values of the address."""
+        return await self._ask(partial(question, **request.query_params))
 
     async def _act(self, request: Request) -> Response:
         body = b''

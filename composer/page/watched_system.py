@@ -9,20 +9,19 @@ from threading import Event, Thread
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
 
-from composer.application.file_selection import load_given
+from composer.application.plan import plan_from
 from composer.application.running_systems import answer_forms
 from composer.application.running_systems.client import STATUS_SEC, Client, RunningSystem
 from composer.application.running_systems.discovery import Discovery
 from composer.application.running_systems.health import read_health
-from composer.checks.absent_packages import AbsentPackages
-from composer.checks.checker import check_in_context, create_context
-from composer.drawing.picture import build_picture
+from composer.application.system_reader import list_files
+from composer.application.watched_files import WatchedFiles
+from composer.drawing.json_document import describe_finding
 from composer.errors import ComposerError
-from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.page.drawn_parts import Drawing, list_code
+from composer.page.drawn_parts import Drawing, draw_files
 from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
-from composer.page.saved_files import SavedFiles
+from composer.planning.text import render_plan
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
@@ -38,24 +37,8 @@ _LOOK_SEC = 5.0
 _IDLE_SEC = 10.0
 _MOST_LINES = 500
 _LONGEST_LINE = 2000
+_MOST_PLAN_LINES = 200
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
-
-
-def draw_files(
-    paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
-) -> Drawing:
-    """Return the drawing of a system with its findings.
-
-    Raises:
-        ComposerError: The files cannot be read, or there is no Graphviz.
-    """
-    system = load_given(paths, words, set_values, is_shown=True)
-    context = create_context(system, InterfaceCatalogue())
-    findings = AbsentPackages().leave_out(check_in_context(system, context))
-    if context is None:
-        texts = [f'{each.span or each.file}: {each.message}' for each in findings]
-        raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
-    return Drawing(build_picture(context, findings), list_code(context))
 
 
 class DrawnFiles:
@@ -264,3 +247,48 @@ class WatchedSystem(DrawnFiles):
         """Hear what comes for a while."""
         while monotonic() < until and not self._ended.is_set():
             client.executor.spin_once(timeout_sec=_POLL_SEC)
+
+
+class SavedFiles:
+    """Compares the files of a system with what runs, whenever one of them is saved.
+
+    Args:
+        running: What it runs from; for the others, too, see `plan_from`.
+
+    Attributes:
+        next_plan: `lines`, as `composer plan` prints them, and `findings`; `None` if a reload
+            would change nothing.
+    """
+
+    def __init__(
+        self, running: str, paths: list[Path], words: list[str], set_values: list[str]
+    ) -> None:
+        self.next_plan: dict[str, Any] | None = None
+        self._given = running, paths, words, set_values
+        # None has been read so far.
+        self._files = WatchedFiles(paths, begun_ns=0)
+        self._thread: Thread | None = None
+
+    def look(self) -> None:
+        """Plan anew, in a thread of its own, if a file was saved; soon `next_plan` is there."""
+        if (self._thread and self._thread.is_alive()) or not self._files.list_changed():
+            return
+        self._files.note_reading()
+        self._thread = Thread(target=self._plan, name='composer-next-plan', daemon=True)
+        self._thread.start()
+
+    def _plan(self) -> None:
+        lines: list[str] = []
+        findings: list[Any] = []
+        try:
+            plan, found, context = plan_from(*self._given)
+            if context is not None:
+                self._files.follow(list_files(context))
+            if plan is None:
+                findings = [describe_finding(each) for each in found]
+            elif plan.operations:
+                lines = render_plan(plan).splitlines()[:_MOST_PLAN_LINES]
+        except (ComposerError, OSError) as error:
+            # A file may go while it is read.
+            lines = [str(error)]
+        self.next_plan = {'lines': lines, 'findings': findings} if lines or findings else None
