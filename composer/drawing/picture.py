@@ -7,6 +7,8 @@ from itertools import count
 from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from composer.checks.connections.topology import full_name
+from composer.checks.connections.wait_conditions import waiters
 from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
 from composer.drawing.delivery import deliveries_of
@@ -19,7 +21,7 @@ from composer.language.qos import (
     format_policy_value,
     resolve_qos,
 )
-from composer.language.specs import ComponentSpec
+from composer.language.specs import ComponentSpec, ProcessSpec
 from composer.names import expand_name, expand_namespace, join_names
 from composer.records import record
 
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ConditionSpec, NodeSpec, ProcessSpec, QosSpec
+    from composer.language.specs import ConditionSpec, NodeSpec, QosSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
 NodeKind: TypeAlias = Literal['node', 'process']
@@ -220,7 +222,8 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
 
 def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
     taken: set[str] = set()
-    for kind, node in _specs(context):
+    for node in waiters(context.spec):
+        kind: NodeKind = 'process' if isinstance(node, ProcessSpec) else 'node'
         namespace = expand_namespace(node.namespace or '')
         full = join_names(namespace, node.name) if kind == 'node' else node.name
         # Two nodes with one name are an error, and are drawn as two.
@@ -235,17 +238,6 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
         )
         found = places.of(node.path)
         yield Box(id_, kind, node.name, namespace, place, node.path, found, node.description)
-
-
-def _specs(
-    context: CheckContext,
-) -> Iterator[tuple[NodeKind, NodeSpec | ProcessSpec | ComponentSpec]]:
-    for node in context.spec.nodes.values():
-        yield 'node', node
-    for process in context.spec.processes.values():
-        yield 'process', process
-    for component in context.spec.components:
-        yield 'node', component
 
 
 def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
@@ -327,7 +319,7 @@ def sends(channel: str, *, provides: bool) -> bool:
 
 
 def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) -> Iterator[Wait]:
-    for _, waiter in _specs(context):
+    for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
             if (target := _target(waiter, condition)) in known:
                 yield Wait(ids[waiter.path], target, condition.path)
@@ -343,5 +335,6 @@ def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) 
 def _target(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
     if condition.kind == 'process':
         return f'process:{condition.name}'
-    name = expand_name(condition.name, waiter.name, expand_namespace(waiter.namespace or ''))
-    return f'{condition.kind}:{name}'
+    if condition.kind == 'node':
+        return f'node:{expand_name(condition.name, waiter.name, waiter.namespace or "/")}'
+    return f'{condition.kind}:{full_name(waiter, condition.kind, condition.name)}'

@@ -44,9 +44,7 @@ _STAGE = 680, 850
 _MOST_FOLDED = 16
 
 
-def draw_files(
-    paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
-) -> Drawing:
+def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]) -> Drawing:
     """Return the drawing of a system with its findings.
 
     Raises:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from composer.errors import ComposerError, ExitCode, UsageError
+from composer.page.drawn_parts import draw_files
 from composer.page.looks import (
     Recording,
     act,
@@ -29,7 +30,7 @@ from composer.page.looks import (
     look_at_message,
     show_template,
 )
-from composer.page.watched_system import DrawnFiles, WatchedSystem
+from composer.page.watched_system import WatchedSystem
 from composer.records import record
 
 try:
@@ -127,8 +128,8 @@ def serve(
         message = 'the page is served to this computer alone: it is not encrypted'
         advice = "ssh -L 8080:127.0.0.1:8080 HOST 'composer page --port 8080 --no-browser'"
         raise UsageError(message, help=f'tunnel it: {advice}')
-    source = DrawnFiles(paths, words, set_values) if paths else WatchedSystem(name)
-    server = PageServer(source, options)
+    drawing = draw_files(paths, words, set_values) if paths else None
+    server = PageServer(WatchedSystem(name, drawing), options)
     click.echo(
         server.address if options.ends_with_input else f'{server.address}\nCtrl-C ends it',
         err=True,
@@ -158,7 +159,7 @@ class PageServer:
         address: With the secret, which is good for one browser after the other.
     """
 
-    def __init__(self, source: DrawnFiles, options: PageOptions) -> None:
+    def __init__(self, source: WatchedSystem, options: PageOptions) -> None:
         self._source = source
         self._secret = secrets.token_urlsafe(32)
         self._settings = {'allows_changes': options.allows_changes, 'editor': options.editor}

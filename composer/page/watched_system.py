@@ -1,4 +1,4 @@
-"""What a page shows: asked of a running system again and again, or read from files."""
+"""What a page shows of a running system, which is asked again and again."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from composer.application.system_reader import list_files
 from composer.application.watched_files import WatchedFiles
 from composer.drawing.json_document import describe_finding
 from composer.errors import ComposerError
-from composer.page.drawn_parts import Drawing, draw_files
+from composer.page.drawn_parts import draw_files
 from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.planning.text import render_plan
 from composer.runtime.control import protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
+
+    from composer.page.drawn_parts import Drawing
 
 _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
@@ -41,8 +43,12 @@ _MOST_PLAN_LINES = 200
 _LEVELS = {10: 'debug', 20: 'info', 30: 'warn', 40: 'error', 50: 'fatal'}
 
 
-class DrawnFiles:
-    """A system that does not run.
+class WatchedSystem:
+    """Asks a running system in a thread of its own.
+
+    Args:
+        name: Of the system; `None` for the only one.
+        drawing: Of files that do not run: nobody is asked.
 
     Attributes:
         state: What the page shows, but for the drawing; another object after each change.
@@ -52,39 +58,17 @@ class DrawnFiles:
         looked_at: When somebody looked last, on the monotonic clock.
     """
 
-    def __init__(
-        self, paths: Sequence[Path], words: Sequence[str] = (), set_values: Sequence[str] = ()
-    ) -> None:
-        self.drawing = draw_files(paths, words, set_values) if paths else None
-        name = self.drawing.name if self.drawing else ''
-        self.state: dict[str, Any] = {'name': name, 'runs': False, 'drawing': 1}
+    def __init__(self, name: str | None, drawing: Drawing | None = None) -> None:
+        self._name = name
+        self.drawing = drawing
+        self.state: dict[str, Any] = {
+            'name': drawing.name if drawing else name or '',
+            'runs': False,
+            'drawing': int(drawing is not None),
+        }
         self.log: deque[dict[str, Any]] = deque(maxlen=_MOST_LINES)
         self.system: RunningSystem | None = None
         self.looked_at = monotonic()
-
-    def start(self) -> None:
-        """There is nothing to watch."""
-
-    def stop(self) -> None:
-        """There is nothing to end."""
-
-    def ask(self, _question: Callable[[Client], Any]) -> Future[Any]:
-        """Nobody answers."""
-        message = 'the system does not run'
-        raise ComposerError(message)
-
-
-class WatchedSystem(DrawnFiles):
-    """Asks a running system in a thread of its own.
-
-    Args:
-        name: Of the system; `None` for the only one.
-    """
-
-    def __init__(self, name: str | None) -> None:
-        super().__init__(())
-        self._name = name
-        self.state = {'name': name or '', 'runs': False, 'drawing': 0}
         self._saved: SavedFiles | None = None
         self._lines = 0
         self._rows: list[dict[str, Any]] = []
@@ -99,12 +83,16 @@ class WatchedSystem(DrawnFiles):
 
     def start(self) -> None:
         """Begin to ask."""
-        self._thread.start()
+        if self.drawing is None:
+            self._thread.start()
+        else:
+            self._asked.set_exception(ComposerError('the system does not run'))
 
     def stop(self) -> None:
         """Ask no more."""
         self._ended.set()
-        self._thread.join(STATUS_SEC)
+        if self._thread.ident is not None:
+            self._thread.join(STATUS_SEC)
 
     def ask(self, question: Callable[[Client], Any]) -> Future[Any]:
         """Call a function with a client in another thread, one after the other."""

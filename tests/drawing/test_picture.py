@@ -269,7 +269,7 @@ def test_processes_and_what_is_waited_for(draw):
         version: 1
         nodes:
           a: {wait_for: [{process: driver}, {topic: elsewhere}]}
-          b: {wait_for: [{service: add}], namespace: /}
+          b: {wait_for: [{service: sum}], remap: {sum: add}, namespace: /}
           c: {services: {add: {type: std_srvs/srv/Trigger, behaviour: parts:add}}}
         processes:
           driver: {command: [run], description: Theirs.}
