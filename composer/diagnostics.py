@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from composer.confidential import conceal
 from composer.records import record
@@ -189,3 +189,17 @@ def relative_path(name: str) -> str:
     path = Path(os.path.abspath(name))  # noqa: PTH100 - `resolve` would follow links
     folder = Path.cwd()
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
+
+
+def describe_finding(finding: Diagnostic) -> dict[str, Any]:
+    """Return a finding as plain data."""
+    span = finding.span
+    return {
+        'rule': finding.rule,
+        'severity': finding.severity.value,
+        'message': finding.message,
+        'help': finding.help,
+        'file': relative_path(finding.file) if finding.file else None,
+        'line': span.line if span else None,
+        'column': span.column if span else None,
+    }

@@ -40,10 +40,9 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import relative_path
+from composer.diagnostics import describe_finding, relative_path
 
 if TYPE_CHECKING:
-    from composer.diagnostics import Diagnostic
     from composer.drawing.picture import Box, Edge, Picture, Wait
 
 _VERSION = 1
@@ -87,18 +86,4 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
             describe(wait, node=wait.waiter, **{'for': wait.target}) for wait in picture.waits
         ],
         'findings': [describe_finding(finding) for finding in picture.findings],
-    }
-
-
-def describe_finding(finding: Diagnostic) -> dict[str, Any]:
-    """Return a finding as plain data."""
-    span = finding.span
-    return {
-        'rule': finding.rule,
-        'severity': finding.severity.value,
-        'message': finding.message,
-        'help': finding.help,
-        'file': relative_path(finding.file),
-        'line': span.line if span else None,
-        'column': span.column if span else None,
     }

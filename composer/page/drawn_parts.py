@@ -6,16 +6,16 @@ import re
 import threading
 from collections import defaultdict
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.application.file_selection import load_given
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
-from composer.diagnostics import relative_path
+from composer.diagnostics import describe_finding, relative_path
 from composer.drawing.excerpts import Excerpts
 from composer.drawing.graphviz import render_svg
-from composer.drawing.json_document import describe_finding
 from composer.drawing.picture import build_picture
 from composer.drawing.shapes import arrange_shapes, count_kinds
 from composer.entity_kinds import CHANNEL_KINDS
@@ -116,21 +116,15 @@ class Drawing:
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
         self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
         self._lock = threading.Lock()
-        self._folded: dict[frozenset[str], dict[str, Any]] = {}
+        self._fold = lru_cache(_MOST_FOLDED)(self._describe)
         self.shown = self._describe(frozenset())
 
     def fold(self, folded: Collection[str]) -> dict[str, Any]:
         """Return it with these boxes folded; one at a time, and the last ones are kept."""
         parts = self.shown['parts'].values()
         key = frozenset(part['id'] for part in parts if 'members' in part).intersection(folded)
-        if not key:
-            return self.shown
         with self._lock:
-            if key not in self._folded:
-                if len(self._folded) >= _MOST_FOLDED:
-                    self._folded.pop(next(iter(self._folded)))
-                self._folded[key] = self._describe(key)
-            return self._folded[key]
+            return self._fold(key) if key else self.shown
 
     def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
         """Return it with the ends outside of topics, too, laid out in the same direction."""
@@ -143,7 +137,7 @@ class Drawing:
         picture = replace(self._picture, channels=tuple(channels))
         return Drawing(picture, self._code, self._directions[0])
 
-    def _describe(self, folded: Collection[str]) -> dict[str, Any]:
+    def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
         documents = {
             each: _inlined(render_svg(self._picture, folded, each)) for each in self._directions
         }

@@ -16,7 +16,7 @@ from composer.application.running_systems.discovery import Discovery
 from composer.application.running_systems.health import read_health
 from composer.application.system_reader import list_files
 from composer.application.watched_files import WatchedFiles
-from composer.drawing.json_document import describe_finding
+from composer.diagnostics import describe_finding
 from composer.errors import ComposerError
 from composer.page.drawn_parts import draw_files
 from composer.page.outside import OutsideEnds
@@ -96,7 +96,7 @@ class WatchedSystem:
 
     def ask(self, question: Callable[[Client], Any]) -> Future[Any]:
         """Call a function with a client in another thread, one after the other."""
-        return self._answerer.submit(lambda: question(self._asked.result()))
+        return self._answerer.submit(lambda: question(self._asked.result(_SNAPSHOT_SEC)))
 
     def _run(self) -> None:
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from composer.diagnostics import relative_path
+from composer.diagnostics import describe_finding, relative_path
 from composer.reports.report import count_severities
 from composer.version import find_version
 
@@ -64,11 +64,8 @@ def _describe_run(report: Report, cases: Sequence[CaseReport]) -> dict[str, Any]
 
 def _describe_finding(finding: Diagnostic) -> dict[str, Any]:
     return {
-        'rule': finding.rule,
-        'severity': finding.severity.value,
-        'message': finding.message,
-        'help': finding.help,
-        **_describe_place(finding.span, finding.file),
+        **describe_finding(finding),
+        'end_column': finding.span and finding.span.column + finding.span.length,
         'related': [
             {'message': related.message, **_describe_place(related.span)}
             for related in finding.related

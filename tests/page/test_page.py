@@ -667,7 +667,6 @@ def test_the_keyboard_alone_reaches_all(acting, browser):
 
 
 def test_boxes_fold_and_the_address_has_the_view(page, browser):
-    from selenium.common import StaleElementReferenceException
     from selenium.webdriver import ActionChains, Keys
 
     find, text_of = partial(find_all, browser), partial(read_text, browser)
@@ -678,21 +677,10 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
         )
         return set(browser.execute_script(script, f'main svg .node.{style}'))
 
-    def click(selector):
-        def done():
-            # It may be drawn anew meanwhile.
-            with suppress(StaleElementReferenceException):
-                for each in find(selector)[:1]:
-                    each.click()
-                    return True
-            return False
-
-        wait_for(done, selector)
-
     browser.get(page.address)
     # A box folds by a click and unfolds by the keyboard; what crosses its border is added up.
     browser.get(f'http://127.0.0.1:{page.port}/#&isolate=down')
-    click('main svg .cluster text')
+    click(browser, 'main svg .cluster text')
     wait_for(lambda: find('main svg .folded.chosen'), 'the folded box')
     assert not find('[aria-label="node /left/talker"]')
     assert 'fold=box%3A%2Fleft' in browser.current_url
@@ -707,10 +695,10 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
     label = 'return document.activeElement.ariaLabel'
     wait_for(lambda: browser.execute_script(label) == 'namespace /left', 'the focus')
     # A click isolates what is downstream, or upstream.
-    click('[aria-label="topic /left/words"] text')
+    click(browser, '[aria-label="topic /left/words"] text')
     wait_for(lambda: names_of('near') == {'topic /left/words', 'node /ear'}, 'what is downstream')
     upstream = {'topic /left/words', 'node /left/talker', 'service /left/switch'}
-    click('#isolation option[value=up]')
+    click(browser, '#isolation option[value=up]')
     wait_for(lambda: names_of('near') == upstream, 'what is upstream')
     assert browser.current_url.endswith('#topic%3A%2Fleft%2Fwords&isolate=up')
     # What is clicked while a drawing comes stays selected.
@@ -720,9 +708,9 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
             ? new Promise((come) => { window.comes = () => come(real(path, ...more)); })
             : real(path, ...more));"""
     )
-    click('#fold-all')
+    click(browser, '#fold-all')
     wait_for(lambda: browser.execute_script('return Boolean(window.comes)'), 'the question')
-    click('[aria-label="node /ear"] text')
+    click(browser, '[aria-label="node /ear"] text')
     wait_for(lambda: '#node%3A%2Fear' in browser.current_url, 'the selection')
     browser.execute_script('window.comes()')
     wait_for(lambda: find('main svg .folded'), 'the folded box')
