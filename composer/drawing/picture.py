@@ -178,17 +178,16 @@ class Picture:
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
     """Return the picture of a system, with the findings at the parts that they are about."""
-    topology = context.topology
-    places = FindingPlaces(context.system.positions, topology, findings)
+    places = FindingPlaces(context.system.positions, context.topology, findings)
     nodes = tuple(_nodes(context, places))
     ids = {node.path: node.id for node in nodes}
-    channels = tuple(_channels(topology, places))
+    channels = tuple(_channels(context.topology, places))
     picture = Picture(
         context.spec.name,
         context.spec.description,
         nodes,
         channels,
-        tuple(_edges(context, topology, places, ids)),
+        tuple(_edges(context, places, ids)),
         tuple(_waits(context, {*ids.values(), *(channel.id for channel in channels)}, ids)),
         tuple(findings),
         context.system.positions,
@@ -272,9 +271,9 @@ def _common_place(places: Sequence[Place]) -> Place:
 
 
 def _edges(
-    context: CheckContext, topology: Topology, places: FindingPlaces, ids: Mapping[DataPath, str]
+    context: CheckContext, places: FindingPlaces, ids: Mapping[DataPath, str]
 ) -> Iterator[Edge]:
-    for channel in topology.channels.values():
+    for channel in context.topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
             # A process may have several nodes; components are drawn apart.

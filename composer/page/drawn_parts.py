@@ -201,10 +201,8 @@ def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
         qos = edge.policies and f'QoS: {edge.policies}'
         delivery = edge.delivery.way and f'delivery: {edge.delivery}'
         facts = [*filter(None, (edge.type, qos, delivery, edge.followed))]
-        name, near = (
-            f'{edge.name} of {names[edge.node]}',
-            [tokens[each] for each in (edge.node, edge.channel)],
-        )
+        name = f'{edge.name} of {names[edge.node]}'
+        near = [tokens[edge.node], tokens[edge.channel]]
         part = _part(edge.id, edge.role, name, facts, edge.findings, near, excerpts.of(edge.path))
         yield tokens[edge.id], {**part, 'leaves_node': edge.begins_at_node}
 
@@ -218,10 +216,9 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
         if token[0] == 'e' and len(members.keys() & set(part['near'])) == 1
     ]
     name = region.title.removeprefix(f'{region.kind} ')
+    facts = [', '.join(count_kinds(members.values()))]
     return {
-        **_part(
-            region.id, region.kind, name, [', '.join(count_kinds(members.values()))], (), near
-        ),
+        **_part(region.id, region.kind, name, facts, (), near),
         'folded': region.id in {shape.id for shape in drawn.root.all_shapes()},
         'members': list(members),
     }
@@ -230,8 +227,7 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
 def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the data of each line that stands for several."""
     for line in drawn.lines:
-        near = [token for token, shown in drawn.stands_in.items() if shown == line.token]
-        near = [token for token in near if token in parts]
+        near = [part for part, by in drawn.stands_in.items() if by == line.token and part in parts]
         if near:
             start, end = (parts[token] for token in (line.start, line.end))
             id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'

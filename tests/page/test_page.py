@@ -477,8 +477,13 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
         wait_for(lambda: old() >= everything, 'an old page')
         # What is old is still read.
         assert find_violations(browser, []) == []
+        wait_for(lambda: not page.json('/api/state')['runs'], 'the page to give up')
+        number = page.json('/api/state')['drawing']
     finally:
         os.kill(child.pid, signal.SIGCONT)
+    # It is drawn anew, and windows that have the old drawing can tell.
+    wait_for(lambda: page.json('/api/state')['runs'], 'the system again')
+    assert page.json('/api/state')['drawing'] > number > 0
     browser.get('about:blank')
     assert page.end() == 130
     assert child.stop() == 0
