@@ -160,7 +160,7 @@ _MADE = frozenset(
 )
 _INSTALLED = {'site-packages', 'dist-packages'}
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
-_Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
+Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
 # Longer ways from a name to its value are not followed.
 _MOST_STEPS = 25
 
@@ -186,7 +186,7 @@ class Names:
         self._kinds: dict[int, FunctionKind | None] = {}
         # How many expressions were walked through.
         self.walked = 0
-        self._stored: dict[int, dict[str, list[_Stored]]] = {}
+        self._stored: dict[int, dict[str, list[Stored]]] = {}
         self._members: dict[int, _Members] = {}
         self._steps = 0
 
@@ -284,13 +284,13 @@ class Names:
             within = within.outer
         return self.top_value(scope.module, name)
 
-    def stored_in(self, definition: ast.AST) -> dict[str, list[_Stored]]:
+    def stored_in(self, definition: ast.AST) -> dict[str, list[Stored]]:
         """Return the names that a function stores, and what it assigns to each."""
         if id(definition) not in self._stored:
             self._stored[id(definition)] = find_stored(definition)
         return self._stored[id(definition)]
 
-    def _stored_value(self, stored: list[_Stored], scope: Scope) -> Value | None:
+    def _stored_value(self, stored: list[Stored], scope: Scope) -> Value | None:
         expression, is_item = stored[0]
         if len(stored) > 1 or expression is None:
             return None
@@ -339,7 +339,7 @@ class Names:
                 return Class(module, statement)
             case ast.Import() | ast.ImportFrom():
                 return self._imported(self._full_name(module, statement, name))
-        for target, value, is_item in _assignments(statement):
+        for target, value, is_item in assignments(statement):
             is_changed = name in module.top.stored_again and isinstance(value, ast.Constant)
             if isinstance(target, ast.Name) and target.id == name and not is_item:
                 return None if is_changed else self.value_of(value, Scope(module))
@@ -456,15 +456,15 @@ class Names:
         return None
 
 
-def find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
+def find_stored(definition: ast.AST) -> dict[str, list[Stored]]:
     """Return the names that a function stores, and what it assigns to each."""
     nodes = list(own_nodes(definition))
-    found: dict[str, list[_Stored]] = {}
+    found: dict[str, list[Stored]] = {}
     shown: set[int] = set()
     shared: set[str] = set()
     for node in nodes:
         shared |= {*node.names} if isinstance(node, ast.Global | ast.Nonlocal) else set()
-        for target, value, is_item in _assignments(node):
+        for target, value, is_item in assignments(node):
             if isinstance(target, ast.Name):
                 shown.add(id(target))
                 found.setdefault(target.id, []).append((value, is_item))
@@ -475,7 +475,7 @@ def find_stored(definition: ast.AST) -> dict[str, list[_Stored]]:
     return {name: several for name, several in found.items() if name not in shared}
 
 
-def _assignments(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
+def assignments(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
     """Yield targets with what is assigned to them, and whether that is one of its items."""
     match node:
         case ast.Assign(targets=targets, value=value):
@@ -491,6 +491,19 @@ def _assignments(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
         ):
             yield target, value, False
         case ast.For(target=target, iter=value) | ast.comprehension(target=target, iter=value):
+            yield from _items_of(target, value)
+
+
+def _items_of(target: ast.expr, value: ast.expr) -> Iterator[tuple[ast.expr, ast.expr, bool]]:
+    match target, value:
+        case ast.Tuple(elts=[_, inner]), ast.Call(func=ast.Name(id='enumerate'), args=[of, *_]):
+            yield from _items_of(inner, of)
+        case ast.Tuple(elts=names), ast.Call(func=ast.Name(id='zip'), args=several):
+            for one, of in zip(names, several, strict=False):
+                yield from _items_of(one, of)
+        case _, ast.Call(func=ast.Name(id='reversed' | 'sorted' | 'list'), args=[of]):
+            yield target, of, True
+        case _:
             yield target, value, True
 
 
@@ -512,7 +525,7 @@ class _Members:
     def _read(self, method: FunctionNode) -> None:
         own_name = next(iter(positional_names(method)), '')
         for node in own_nodes(method):
-            for target, value, _ in _assignments(node):
+            for target, value, _ in assignments(node):
                 match target:
                     case ast.Attribute(value=ast.Name(id=owner), attr=name):
                         if owner == own_name and not _is_none(value):

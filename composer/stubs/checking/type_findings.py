@@ -18,8 +18,9 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
+from composer.node_uses.names import assignments, find_stored
 from composer.node_uses.node_calls import OF_RCLPY
-from composer.python_source.syntax import words_in
+from composer.python_source.syntax import positional_names, words_in
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, Related
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.specs import NodeSpec
+    from composer.node_uses.names import Stored
     from composer.stubs.checking.annotated_copies import FunctionKey, FunctionUse, Received
     from composer.stubs.checking.type_checker import TypeReport
     from composer.stubs.node_stubs import NodeShape
@@ -77,7 +79,6 @@ _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
 _TIMES = frozenset({'Time', 'Duration'})
-_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 # Functions and modules whose types are those of Python itself.
 _OF_PYTHON = frozenset({*dir(builtins), *sys.stdlib_module_names})
 # Classes of Python, of which fields and parameters are.
@@ -274,15 +275,16 @@ class TypeFindings:
         imports = place.syntax.copy.module.source.imports
         if not isinstance(value, ast.Name):
             return _is_made(imports, value)
-        stored = _stored(place.function).get(value.id) if place.function else None
+        stored = find_stored(place.function).get(value.id) if place.function else None
         if stored is None:
             use = self._use(place)
             is_received = bool(use and value.id in use.received)
             return is_received or bool(_INTERFACE.search(imports.get(value.id, '')))
-        return len(stored) == 1 and _is_made(imports, stored[0])
+        (made, is_item), *others = stored
+        return not (others or is_item) and _is_made(imports, made)
 
     def _is_declared(
-        self, place: ReportedPlace, value: ast.expr, seen: frozenset[str] = frozenset()
+        self, place: ReportedPlace, value: ast.AST | None, seen: frozenset[str] = frozenset()
     ) -> bool:
         """Return whether a value comes from the node or a message, in one way only.
 
@@ -297,9 +299,7 @@ class TypeFindings:
                     return False
                 case ast.Call(func=inner) | ast.Attribute(value=inner):
                     value = inner
-                case (
-                    ast.Subscript(value=inner) | ast.Await(value=inner) | ast.Starred(value=inner)
-                ):
+                case ast.Subscript(value=inner) | ast.Await(value=inner):
                     value = inner
                 case _:
                     return False
@@ -307,9 +307,9 @@ class TypeFindings:
         if stored is None:
             use = self._use(place)
             return bool(use and value.id in use.received)
-        if len(stored) > 1 or stored[0] is None or value.id in seen:
-            return False
-        return self._is_declared(place, stored[0], seen | {value.id})
+        (known, _), *others = stored
+        is_one = not others and value.id not in seen
+        return is_one and self._is_declared(place, known, seen | {value.id})
 
     # Arguments
 
@@ -707,7 +707,7 @@ class TypeFindings:
         return {choice for each in found if each for choice in each.choices or ()}
 
 
-def _is_made(imports: Mapping[str, str], value: ast.expr | None) -> bool:
+def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
     """Return whether an expression has the one type that the stubs give it."""
     match value:
         case ast.Await(value=inner):
@@ -719,87 +719,31 @@ def _is_made(imports: Mapping[str, str], value: ast.expr | None) -> bool:
     return False
 
 
-def _sources(place: ReportedPlace, name: str) -> list[ast.expr | None] | None:
-    """Return what a name stands for where a report is; see `_stored`."""
+def _sources(place: ReportedPlace, name: str) -> list[Stored] | None:
+    """Return what a name stands for where a report is; see `find_stored`."""
     for index, node in enumerate(place.around):
-        inner = [node]
-        if isinstance(node, _COMPREHENSIONS):
-            inner = [*node.generators]
-        elif isinstance(node, ast.Lambda):
-            calls = (each for each in place.around[index:] if isinstance(each, ast.Call))
-            inner = [*itertools.islice(calls, 1)]
-        elif not isinstance(node, ast.For) or len(_stored(node).get(name, ())) > 1:
-            continue
-        for each in inner:
-            for target, value in _bindings(each):
-                if name == (target.arg if isinstance(target, ast.arg) else target.id):
-                    return [value]
-        if isinstance(node, ast.Lambda) and name in {each.arg for each in node.args.args}:
-            return [None]
-    return _stored(place.function).get(name) if place.function else None
+        loops: list[ast.AST] = getattr(node, 'generators', [])
+        if isinstance(node, ast.Lambda) and name in positional_names(node):
+            call = next(
+                (each for each in place.around[index:] if isinstance(each, ast.Call)), None
+            )
+            return [(_items_given(call, node), True)]
+        if isinstance(node, ast.For) and name not in find_stored(node):
+            loops = [node]
+        for target, value, is_item in itertools.chain.from_iterable(map(assignments, loops)):
+            if isinstance(target, ast.Name) and target.id == name:
+                return [(value, is_item)]
+    return find_stored(place.function).get(name) if place.function else None
 
 
-def _stored(syntax: ast.AST) -> dict[str, list[ast.expr | None]]:
-    """Return what a function or a loop binds, by name: the value, or, starred, what it is one of.
-
-    `None` stands for what nothing shows. What is bound in an expression alone is left out.
-    """
-    stored: dict[str, list[ast.expr | None]] = {}
-    shown: set[int] = set()
-    for node in ast.walk(syntax):
-        for target, value in _bindings(node):
-            shown.add(id(target))
-            if isinstance(target, ast.Name) and not isinstance(node, ast.comprehension):
-                stored.setdefault(target.id, []).append(value)
-        is_name = isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
-        if isinstance(node, ast.comprehension):
-            shown |= {id(each) for each in ast.walk(node.target)}
-        elif isinstance(node, ast.Name) and is_name and id(node) not in shown:
-            stored.setdefault(node.id, []).append(None)
-    return stored
-
-
-def _bindings(node: ast.AST) -> Iterator[tuple[ast.Name | ast.arg, ast.expr]]:
-    """Yield the names that a statement or an expression binds, with what tells their type."""
-    match node:
-        case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
-            pairs = list(zip(names, values, strict=False)) if len(names) == len(values) else []
-        case ast.Assign(targets=targets, value=value):
-            pairs = [(target, value) for target in targets]
-        case ast.NamedExpr(target=name, value=value):
-            pairs = [(name, value)]
-        case ast.For(target=target, iter=items) | ast.comprehension(target=target, iter=items):
-            pairs = _taken(target, items)
-        case ast.Call(func=ast.Name(id='max' | 'min' | 'sorted'), args=[items], keywords=keywords):
-            keys = (each.value for each in keywords if each.arg == 'key')
-            for key in keys:
-                if isinstance(key, ast.Lambda) and len(key.args.args) == 1:
-                    yield key.args.args[0], items
-            return
-        case ast.Call(func=ast.Name(id='map' | 'filter'), args=[ast.Lambda() as key, items]):
-            if len(key.args.args) == 1:
-                yield key.args.args[0], items
-            return
-        case _:
-            return
-    yield from ((name, value) for name, value in pairs if isinstance(name, ast.Name))
-
-
-def _taken(target: ast.expr, items: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
-    """Return the names of a loop with what their values are items of, starred."""
-    match target, items:
-        case ast.Tuple(elts=[_, inner]), ast.Call(func=ast.Name(id='enumerate'), args=[of, *_]):
-            return _taken(inner, of)
-        case ast.Tuple(elts=names), ast.Call(func=ast.Name(id='zip'), args=several):
-            if len(names) == len(several):
-                pairs = zip(names, several, strict=True)
-                return [pair for name, of in pairs for pair in _taken(name, of)]
-            return []
-        case ast.Name(), ast.Call(func=ast.Name(id='reversed' | 'sorted' | 'list'), args=[of]):
-            return [(target, ast.Starred(of))]
-        case ast.Name(), _:
-            return [(target, ast.Starred(items))]
-    return []
+def _items_given(call: ast.Call | None, function: ast.Lambda) -> ast.expr | None:
+    """Return the items with which a call calls a function of one parameter, if it is known."""
+    match call:
+        case ast.Call(
+            func=ast.Name(id='filter' | 'map' | 'max' | 'min' | 'sorted'), args=[*first, items]
+        ) if first in ([], [function]) and len(function.args.args) == 1:
+            return items
+    return None
 
 
 def _missing_return(use: FunctionUse) -> _Problem | None:
