@@ -74,16 +74,6 @@ class CopySyntax:
         )
 
     @cached_property
-    def guarded(self) -> frozenset[int]:
-        """The syntax nodes whose errors the module itself catches, or that may never run."""
-        return frozenset(
-            id(inner)
-            for node in ast.walk(self.copy.module.tree)
-            for guarded in _guarded_nodes(node)
-            for inner in ast.walk(guarded)
-        )
-
-    @cached_property
     def nodes(self) -> dict[tuple[int, int], list[ast.AST]]:
         """The statements and expressions that begin at each place, outermost first."""
         places: dict[tuple[int, int], list[ast.AST]] = {}
@@ -158,7 +148,7 @@ class ReportedPlace:
     def is_left_alone(self) -> bool:
         """Whether what the report is about may be caught, asked for, or never come."""
         chain, function = self.around, self.function
-        if not chain or any(id(node) in self.syntax.guarded for node in chain):
+        if not chain or any(itertools.starmap(_is_guarded, itertools.pairwise(chain))):
             return True
         asked = {
             name
@@ -242,18 +232,18 @@ def _asked_names(node: ast.AST) -> list[ast.expr]:
     return []
 
 
-def _guarded_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    if isinstance(node, ast.Try | ast.TryStar) and any(map(_catches, node.handlers)):
-        yield from node.body
-    elif isinstance(node, ast.With | ast.AsyncWith):
-        calls = [item.context_expr for item in node.items]
-        names = words_in(*(call for call in calls if isinstance(call, ast.Call)))
-        if names & {'suppress', 'raises'}:
-            yield from node.body
-    elif isinstance(node, ast.If) and _is_fixed(node.test):
-        yield from (*node.body, *node.orelse)
-    elif isinstance(node, ast.IfExp) and _is_fixed(node.test):
-        yield from (node.body, node.orelse)
+def _is_guarded(inner: ast.AST, node: ast.AST) -> bool:
+    """Return whether errors in a part of a node are caught, or the part may never run."""
+    match node:
+        case ast.Try() | ast.TryStar():
+            return inner in node.body and any(map(_catches, node.handlers))
+        case ast.With() | ast.AsyncWith():
+            calls = [each.context_expr for each in node.items]
+            names = words_in(*(each for each in calls if isinstance(each, ast.Call)))
+            return inner in node.body and bool(names & {'suppress', 'raises'})
+        case ast.If() | ast.IfExp():
+            return inner is not node.test and _is_fixed(node.test)
+    return False
 
 
 def _is_fixed(test: ast.expr) -> bool:
