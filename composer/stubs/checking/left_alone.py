@@ -161,26 +161,6 @@ class ReportedPlace:
         names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
         return bool(names & asked) or any(map(_depends_on_file, _branches(chain)))
 
-    @property
-    def depends_on_file(self) -> bool:
-        """Whether the report comes after a branch that ends its function as the file says.
-
-        Of a branch with the report in it, `is_left_alone` knows.
-        """
-        function, chain = self.function, self.around
-        if function is None:
-            return True
-        extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
-        inside = {id(node) for node in _branches(chain)}
-        tests = {id(node) for node in chain} - inside
-        return any(
-            isinstance(node, _BRANCHES)
-            and self.syntax.start(node)[0] <= self.report.line
-            and (_depends_on_file(node) or extra & words_in(*_test(node)))
-            and (id(node) in inside or (id(node) not in tests and _may_end(node)))
-            for node in ast.walk(function)
-        )
-
 
 def _branches(chain: list[ast.AST]) -> Iterator[ast.AST]:
     """Yield the branches that decide whether the innermost node of a chain is reached."""
@@ -208,11 +188,6 @@ def _is_of_file(test: ast.AST) -> bool:
     if is_joined:
         return bool(operands) and all(map(_is_of_file, operands))
     return any(map(_is_of_file, children))
-
-
-def _may_end(branch: ast.AST) -> bool:
-    ends = (ast.Return, ast.Raise, ast.Break, ast.Continue)
-    return isinstance(branch, ast.Assert) or any(isinstance(n, ends) for n in ast.walk(branch))
 
 
 def _test(branch: ast.AST) -> list[ast.AST]:

@@ -52,7 +52,6 @@ not-iterable = true
 read-only = true
 unexpected-keyword = true
 unsupported-operation = true
-unused-coroutine = true
 """
 
 

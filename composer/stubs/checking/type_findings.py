@@ -70,10 +70,10 @@ _PARTS = {
 }
 _INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 _SECTIONS = {
-    'publish': ('publishers', 'publisher', ''),
-    'call': ('service_clients', 'service client', '_Request'),
-    'call_async': ('service_clients', 'service client', '_Request'),
-    'send_goal': ('action_clients', 'action client', '_Goal'),
+    'publish': ('publishers', ''),
+    'call': ('service_clients', '_Request'),
+    'call_async': ('service_clients', '_Request'),
+    'send_goal': ('action_clients', '_Goal'),
 }
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
@@ -144,7 +144,6 @@ class TypeFindings:
             'not-iterable': self._iteration,
             'unexpected-keyword': self._keyword,
             'unsupported-operation': self._operation,
-            'unused-coroutine': self._unused,
         }
 
     def _finding(
@@ -169,7 +168,7 @@ class TypeFindings:
 
     # Attributes
 
-    def _attribute(self, place: ReportedPlace) -> _Problem | None:  # noqa: C901, PLR0911
+    def _attribute(self, place: ReportedPlace) -> _Problem | None:  # noqa: C901
         match = _ATTRIBUTE.search(place.report.message)
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
@@ -203,15 +202,13 @@ class TypeFindings:
                 return None
             advice = OF_RCLPY.get(name, advice)
             return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
-        if not self._is_of_one_type(place, node.value):
+        # The walk of behaviours finds names that nodes do not have.
+        if of_node in self.nodes or not self._is_of_one_type(place, node.value):
             return None
-        if of_node != owner and owner not in self.nodes and of_node in self.nodes:
-            return None if place.depends_on_file else self._unknown_name(owner, name, node)
-        if owner in self.messages and not is_part and owner not in self.nodes:
+        if owner in self.messages and not is_part:
             full_name = self.messages[owner]
             return self._unknown_field(full_name, name, node) if full_name else None
-        rule, what = 'unknown-attribute', _PARTS.get(owner, 'the node')
-        message = f"{what} has no attribute '{name}'"
+        rule, message = 'unknown-attribute', f"{_PARTS.get(owner)} has no attribute '{name}'"
         if owner == 'Coroutine':
             rule, advice = 'missing-await', 'put await before the call'
             message = f"'{name}' is read of a coroutine, which has not been awaited"
@@ -240,17 +237,6 @@ class TypeFindings:
             )
             and any(function in each.body for each in classes if each.name == owner)
         )
-
-    def _unknown_name(self, owner: str, name: str, node: ast.expr) -> _Problem:
-        of_node = owner.removesuffix('Parameters').removesuffix('State')
-        label, shape = self.nodes[of_node][0].name, self.shapes[of_node]
-        rule, section, known = 'unknown-state', 'state', shape.state or ()
-        message = f"neither 'state:' of node '{label}' nor a behaviour sets '{name}'"
-        if owner.endswith('Parameters'):
-            rule, section, known = 'unknown-parameter', 'parameters', shape.parameters
-            message = f"node '{label}' declares no parameter '{name}'"
-        advice = f"declare it under '{section}:'"
-        return node, rule, message, suggest(name, [each for each, _ in known], None, advice)
 
     def _unknown_field(self, full_name: str, name: str, node: ast.expr) -> _Problem | None:
         description = self.context.types.describe(full_name)
@@ -387,7 +373,7 @@ class TypeFindings:
         name, payload = values.get('name'), values.get('payload')
         if None in keywords or name is None:
             return None
-        section, noun, part = _SECTIONS[method]
+        section, part = _SECTIONS[method]
         known = dict(getattr(self.shapes[owner], section))
         if not isinstance(name, ast.Constant):
             is_swapped = isinstance(payload, ast.Constant) and payload.value in known
@@ -395,12 +381,7 @@ class TypeFindings:
                 return None
             message = f'{method}(name, payload) takes the name first, got {given}'
             return name, 'bad-call', message, 'swap the arguments'
-        if name.value not in known:
-            if '' in known or place.depends_on_file:
-                return None
-            message = f"node '{self.nodes[owner][0].name}' declares no {noun} {name.value!r}"
-            return name, f'unknown-{noun.replace(" ", "-")}', message, suggest(name.value, known)
-        types = known[name.value]
+        types = known.get(name.value, ())
         if payload is None or len(types) != 1 or not types[0]:
             return None
         return self._payload(f'{types[0]}{part}', payload, given)
@@ -416,7 +397,7 @@ class TypeFindings:
         if full_name is None:
             return None
         if match is None or match[1] == 'None':
-            return _missing_return(use)
+            return None
         return self._payload(full_name, place.values[0], match[1]) if place.values else None
 
     def _payload(self, full_name: str, value: ast.expr, given: str) -> _Problem | None:
@@ -647,14 +628,6 @@ class TypeFindings:
                     return node.func, 'bad-call', message, None
         return None
 
-    def _unused(self, place: ReportedPlace) -> _Problem | None:
-        for node in place.values:
-            match node:
-                case ast.Call(func=ast.Attribute(attr='call_async')):
-                    message = f"'{ast.unparse(node.func)}(…)' is never awaited, so it never runs"
-                    return node, 'missing-await', message, 'put await before it'
-        return None
-
     def _comparison(self, place: ReportedPlace) -> _Problem | None:
         """Return a field or a parameter that is compared with a constant of another type."""
         types = _COMPARED.search(place.report.message)
@@ -744,19 +717,6 @@ def _items_given(call: ast.Call | None, function: ast.Lambda) -> ast.expr | None
         ) if first in ([], [function]) and len(function.args.args) == 1:
             return items
     return None
-
-
-def _missing_return(use: FunctionUse) -> _Problem | None:
-    """Return that a function returns nothing anywhere."""
-    for node in ast.walk(use.definition):
-        if isinstance(node, ast.Raise) or (isinstance(node, ast.Return) and node.value):
-            return None
-    message = 'this function returns nothing, and the caller gets an error'
-    name = ast.Name(use.definition.name, lineno=use.definition.lineno)
-    keyword = 'async def ' if isinstance(use.definition, ast.AsyncFunctionDef) else 'def '
-    name.col_offset = use.definition.col_offset + len(keyword)
-    name.end_lineno, name.end_col_offset = name.lineno, name.col_offset + len(name.id)
-    return name, 'missing-return', message, 'return something at its end'
 
 
 def _type_of_literal(literal: re.Match[str]) -> str:
