@@ -131,7 +131,9 @@ class BehaviourReader:
             return missing_reading() if is_missing else unknown_reading()
         walk = Walk(self._names, self._followed)
         try:
-            given = self._given(function, binding)
+            second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
+            values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
+            given: dict[str, Value] = dict(zip(function.parameters, values, strict=False))
             walk.enter(function, {**given}, is_waited=True, is_call=False)
             _Results(walk, function, given, binding, wire).note()
             if len(given) < len(binding.parameters):
@@ -148,19 +150,12 @@ class BehaviourReader:
             of = self._names.top_value(module, behaviour.class_name)
             if not isinstance(of, Class) or of.definition.keywords:
                 return None
-            value = self._names.attribute(self._object_of(of), behaviour.method_name)
+            # The object is made with the node.
+            init = self._names.attribute(Instance(of), '__init__')
+            names = init.parameters[:1] if isinstance(init, Function) else []
+            made = Instance(of, tuple((name, Chain(('node',))) for name in names))
+            value = self._names.attribute(made, behaviour.method_name)
         return value if isinstance(value, Function) else None
-
-    def _object_of(self, of: Class) -> Instance:
-        """Return the object that the node has of a class: it is made with the node."""
-        init = self._names.attribute(Instance(of), '__init__')
-        names = init.parameters[:1] if isinstance(init, Function) else []
-        return Instance(of, tuple((name, Chain(('node',))) for name in names))
-
-    def _given(self, function: Function, binding: Binding) -> dict[str, Value]:
-        second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
-        values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
-        return dict(zip(function.parameters, values, strict=False))
 
 
 @record
@@ -189,8 +184,12 @@ class _Results:
         definition = self.function.definition
         if isinstance(definition, ast.Lambda):
             return
-        if self.function.bound is not None:
-            self._note_init(self.function.bound)
+        bound = self.function.bound
+        if isinstance(bound, Instance):
+            # The object whose method it is has been made, too.
+            init = self.walk.run.names.attribute(bound, '__init__')
+            if isinstance(init, Function):
+                self.walk.enter(init, {**dict(bound.given)}, is_waited=True, is_call=False)
         is_generator = self.kind is not None and self.kind.is_generator
         for node in own_nodes(definition):
             match node:
@@ -207,13 +206,6 @@ class _Results:
         # The last one that an asynchronous generator yields is the result.
         if self.wire.needs_payload and is_allowed and not is_last:
             self._check_ways(definition)
-
-    def _note_init(self, bound: Value) -> None:
-        """Walk through the making of the object whose method the behaviour is."""
-        names = self.walk.run.names
-        init = names.attribute(bound, '__init__')
-        if isinstance(bound, Instance) and isinstance(init, Function):
-            self.walk.enter(init, {**dict(bound.given)}, is_waited=True, is_call=False)
 
     def _note_payload(self, value: ast.expr, key: str) -> None:
         module = self.function.module
@@ -250,8 +242,9 @@ class _Results:
 
     def _check_ways(self, definition: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
         """Check that all ways give the response or result that is waited for."""
-        if _is_stub(definition):
-            return
+        plain = (each.value if isinstance(each, ast.Expr) else each for each in definition.body)
+        if all(isinstance(each, ast.Constant | ast.Pass) for each in plain):
+            return  # It is still to be written: it has a docstring, `...` or `pass`.
         names, module = self.walk.run.names, self.function.module
 
         def is_last(call: ast.Call) -> bool:
@@ -273,12 +266,6 @@ def _is_made_there(node: ast.expr) -> bool:
     called = node.func if isinstance(node, ast.Call) else None
     name = str(getattr(called, 'id', None) or getattr(called, 'attr', ''))
     return isinstance(node, ast.Dict) or name[:1].isupper()
-
-
-def _is_stub(definition: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
-    """Return whether a function is still to be written: it has a docstring, `...` or `pass`."""
-    plain = (each.value if isinstance(each, ast.Expr) else each for each in definition.body)
-    return all(isinstance(each, ast.Constant | ast.Pass) for each in plain)
 
 
 def _type_of(value: ast.expr) -> type | None:

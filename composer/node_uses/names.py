@@ -232,14 +232,12 @@ class Names:
 
     def alias_of(self, name: str, scope: Scope) -> ast.AST | None:
         """Return what a function assigns to a name, where it does once."""
-        stored = self.stored_in(scope.definition).get(name, []) if scope.definition else []
+        stored = self.stored_in(scope.definition).get(name, [])
         return stored[0][0] if len(stored) == 1 and not stored[0][1] else None
 
     def is_local(self, name: str, scope: Scope) -> bool:
         """Return whether a name is one of a function."""
-        definition = scope.definition
-        is_stored = definition is not None and name in self.stored_in(definition)
-        return is_stored or name in scope.arguments
+        return name in self.stored_in(scope.definition) or name in scope.arguments
 
     # Expressions
 
@@ -284,7 +282,7 @@ class Names:
             within = within.outer
         return self.top_value(scope.module, name)
 
-    def stored_in(self, definition: ast.AST) -> dict[str, list[Stored]]:
+    def stored_in(self, definition: ast.AST | None) -> dict[str, list[Stored]]:
         """Return the names that a function stores, and what it assigns to each."""
         if id(definition) not in self._stored:
             self._stored[id(definition)] = find_stored(definition)
@@ -456,7 +454,7 @@ class Names:
         return None
 
 
-def find_stored(definition: ast.AST) -> dict[str, list[Stored]]:
+def find_stored(definition: ast.AST | None) -> dict[str, list[Stored]]:
     """Return the names that a function stores, and what it assigns to each."""
     nodes = list(own_nodes(definition))
     found: dict[str, list[Stored]] = {}

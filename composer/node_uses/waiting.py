@@ -206,9 +206,7 @@ def _changed_name(run: Run, node: ast.Name | ast.Attribute, scope: Scope) -> Awa
 
 def global_name(run: Run, name: str, scope: Scope) -> Awaited | None:
     """Return a name of a module that functions store."""
-    is_own = scope.definition is not None and (
-        name in run.names.stored_in(scope.definition) or name in scope.given
-    )
+    is_own = name in run.names.stored_in(scope.definition) or name in scope.given
     if is_own or name not in scope.module.top.stored_again:
         return None
     return Awaited('', str(scope.module.path), name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import re
 from functools import cache
 from itertools import zip_longest
 from pathlib import Path
@@ -69,7 +70,7 @@ LOGGER_NAMES = frozenset(
 _SPINNING = frozenset(
     f'rclpy.{name}' for name in ('spin', 'spin_once', 'spin_until_future_complete')
 )
-_CLASSES_OF_RCLPY = {'Node', 'LifecycleNodeMixin', 'LifecycleNode'}
+_METHOD = re.compile(r'^    def ([a-z]\w*)', re.MULTILINE)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 # Functions that keep nothing of what they are given.
 _HARMLESS = frozenset(
@@ -441,7 +442,9 @@ class Walk:
                     return ''
                 if self._is_given(name, scope) or self._is_constant(name, scope):
                     return 'file' if self._is_given(name, scope) else 'fixed'
-                return self._strongest(self._assigned(name, scope), scope, seen | {name}) or ''
+                stored = self._names.stored_in(scope.definition).get(name, [])
+                values = [value for value, _ in stored if value is not None]
+                return self._strongest(values, scope, seen | {name}) or ''
             case ast.Compare() | ast.BinOp() | ast.Call():
                 # A value of the run beside one of the file: both outcomes may come.
                 operands = _operands(node)
@@ -482,12 +485,6 @@ class Walk:
             case [(ast.Assign(value=ast.Constant()) | ast.ImportFrom(), _), *_]:
                 return name.isupper()
         return False
-
-    def _assigned(self, name: str, scope: Scope) -> list[ast.AST]:
-        if scope.definition is None:
-            return []
-        stored = self._names.stored_in(scope.definition).get(name, [])
-        return [value for value, _ in stored if value is not None]
 
     def _asked_in(self, scope: Scope) -> set[str]:
         """Return the parameters and states that a function asks whether they have a value."""
@@ -1029,15 +1026,7 @@ def _gives(definition: ast.AST) -> bool:
 def _ros_members() -> frozenset[str]:
     """Return the names of the public methods and properties of `node.ros`; without rclpy, none."""
     package = importlib.util.find_spec('rclpy')
-    names: set[str] = set()
-    for folder in package.submodule_search_locations or () if package else ():
-        for path in (Path(folder) / 'node.py', Path(folder) / 'lifecycle' / 'node.py'):
-            try:
-                tree = ast.parse(path.read_bytes())
-            except (OSError, SyntaxError):
-                return frozenset()
-            for of in tree.body:
-                if isinstance(of, ast.ClassDef) and of.name in _CLASSES_OF_RCLPY:
-                    methods = (each for each in of.body if isinstance(each, ast.FunctionDef))
-                    names |= {each.name for each in methods if each.name[0] != '_'}
-    return frozenset(names)
+    folders = map(Path, package.submodule_search_locations or () if package else ())
+    paths = [each / name for each in folders for name in ('node.py', 'lifecycle/node.py')]
+    texts = (each.read_text() for each in paths if each.is_file())
+    return frozenset(name for text in texts for name in _METHOD.findall(text))

@@ -61,23 +61,16 @@ def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> 
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             return Annotation()
     if isinstance(expression, ast.Subscript):
-        return _read_subscript(expression)
+        name, items = dotted_name(expression.value), expression.slice
+        if name.rpartition('.')[2] in _GENERATORS:
+            return Annotation(items=tuple(items.elts if isinstance(items, ast.Tuple) else [items]))
+        return Annotation(builtin=name if name in _BUILTINS else None)
     name = dotted_name(expression)
     if name in _BUILTINS and name not in imports:
         return Annotation(builtin=name)
     first, separator, rest = name.partition('.')
     full = imports.get(first)
     return Annotation(interface=find_interface(full + separator + rest)) if full else Annotation()
-
-
-def _read_subscript(expression: ast.Subscript) -> Annotation:
-    name = dotted_name(expression.value)
-    if name in _BUILTINS:
-        return Annotation(builtin=name)
-    if name.rpartition('.')[2] in _GENERATORS:
-        items = expression.slice
-        return Annotation(items=tuple(items.elts if isinstance(items, ast.Tuple) else [items]))
-    return Annotation()
 
 
 def dotted_name(expression: ast.expr | None) -> str:

@@ -54,7 +54,7 @@ def list_nodes(body: Iterable[ast.AST]) -> list[ast.AST]:
     return nodes
 
 
-def own_nodes(definition: ast.AST) -> Iterator[ast.AST]:
+def own_nodes(definition: ast.AST | None) -> Iterator[ast.AST]:
     """Yield the nodes of a function, and not those of functions and classes in it."""
     body = getattr(definition, 'body', [])
     pending: list[ast.AST] = list(body) if isinstance(body, list) else [body]
@@ -177,16 +177,12 @@ def parse_source(content: bytes, path: Path) -> ast.Module:
         compile(content, str(path), 'exec', dont_inherit=True)
         message = f'{path} nests too deep'
         raise UnreadModuleError(message) from error
-    if len(_CODE_OBJECT.findall(content)) <= _MOST_CODE_OBJECTS and _is_cheap(tree):
-        # The compiler finds more errors than the parser, such as `return` outside a function.
-        compile(content, str(path), 'exec', dont_inherit=True)
+    if len(_CODE_OBJECT.findall(content)) <= _MOST_CODE_OBJECTS:
+        written, compiled, _ = _measure(tree.body)
+        if compiled - written <= _MOST_COPIED_CHARACTERS:
+            # The compiler finds more errors than the parser, such as `return` outside a function.
+            compile(content, str(path), 'exec', dont_inherit=True)
     return tree
-
-
-def _is_cheap(tree: ast.Module) -> bool:
-    """Return whether a compiled module is not much larger than its source."""
-    written, compiled, _ = _measure(tree.body)
-    return compiled - written <= _MOST_COPIED_CHARACTERS
 
 
 def _measure(body: Iterable[ast.AST]) -> tuple[int, int, int]:

@@ -77,23 +77,16 @@ def shape_of(
             `find_stored_names` returns it.
         created: What its behaviours create.
     """
+    known = [names for names in stored if names is not None]
+    names = sorted({*node.state}.union(*known))
+    state = ((name, (_type_of_state(node.state.get(name), known, name),)) for name in names)
     return NodeShape(
         _types(node.publishers, created, 'publisher'),
         _types(node.service_clients, created, 'service client'),
         _types(node.action_clients),
         parameter_types(node),
-        _state_of(node, stored),
+        tuple(state) if len(known) == len(stored) else None,
     )
-
-
-def _state_of(
-    node: NodeSpec, stored: Sequence[Mapping[str, frozenset[str]] | None]
-) -> Types | None:
-    known = [names for names in stored if names is not None]
-    if len(known) < len(stored):
-        return None
-    names = sorted({*node.state}.union(*known))
-    return tuple((name, (_type_of_state(node.state.get(name), known, name),)) for name in names)
 
 
 def parameter_types(node: NodeSpec) -> Types:

@@ -87,10 +87,10 @@ def _read(context: CheckContext, name: str, roots: list[Path]) -> ProjectModule 
         return None
     tree = ast.Module([*source.body], [])
     imports: list[str] = []
-    for node in ast.walk(tree):
+    for node in source.import_statements:
         if isinstance(node, ast.Import):
             imports += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             home = home_of(node, name, is_package=source.is_package)
             imports += [home, *(f'{home}.{alias.name}' for alias in node.names)]
     module = ProjectModule(name, source, tree, tuple(dict.fromkeys(imports)))

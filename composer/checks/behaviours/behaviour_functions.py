@@ -181,17 +181,12 @@ def _explain_missing_function(
         rule, text = 'uncallable-behaviour', f"'{behaviour.name}' is {what}, and cannot be called"
     else:
         text = f"{behaviour.module} has no function '{part}'"
-        advice = _suggest_function(part, module)
+        # Classes and constants have capitals, and what it imports is there for other ends.
+        callables = [each for each in module.functions if each[0] != '_' and not each[0].isupper()]
+        own = [each for each in callables if each not in module.imports]
+        near = did_you_mean(find_nearest(part, callables))
+        advice = near or suggest('', own, 'it has', 'it has no functions')
     return context.at_value(behaviour.path, rule, text, part=part, help=advice)
-
-
-def _suggest_function(name: str, module: ModuleSource) -> str:
-    """Return the nearest name that a module can call, or its own functions."""
-    # Classes and constants have capitals, and what it imports is there for other ends.
-    callables = [each for each in module.functions if each[0] != '_' and not each[0].isupper()]
-    own = [each for each in callables if each not in module.imports]
-    near = find_nearest(name, callables)
-    return did_you_mean(near) or suggest('', own, 'it has', 'it has no functions') or ''
 
 
 def _check_signature(

@@ -69,17 +69,15 @@ def _check_fields(
     heard = _describe(context, subscription.type)
     made = _describe(context, publisher.type) if publisher else None
     for name, expression in fields.items():
-        path = (*subscription.path, 'with', 'fields', name)
-        findings = list(_check_name(context, made, name, path)) if made else []
+        path, value = (*subscription.path, 'with', 'fields', name), None
         if heard:
             wrong, value = evaluate_over(str(expression), heard, context.catalogue)
-            findings += [
-                context.at_value(path, each.rule, each.message, part=each.part, help=each.help)
-                for each in wrong
-            ]
-            if made and value and not findings:
-                findings += _check_type(context, made, value, path)
-        yield from findings
+            for each in wrong:
+                message, part = each.message, each.part
+                yield context.at_value(path, each.rule, message, part=part, help=each.help)
+            value = None if wrong else value
+        if made:
+            yield from _check_field(context, made, value, path)
 
 
 def _describe(context: CheckContext, type_name: str) -> MessageDescription | None:
@@ -87,11 +85,12 @@ def _describe(context: CheckContext, type_name: str) -> MessageDescription | Non
     return description if isinstance(description, MessageDescription) else None
 
 
-def _check_name(
-    context: CheckContext, made: MessageDescription, name: str, path: DataPath
+def _check_field(
+    context: CheckContext, made: MessageDescription, value: ExpressionValue | None, path: DataPath
 ) -> Iterator[Diagnostic]:
+    """Check that a field exists, and that the value of its expression fits it."""
     owner: MessageDescription | None = made
-    *outer, last = name.split('.')
+    *outer, last = str(path[-1]).split('.')
     for part in outer:
         field = owner.field(part) if owner else None
         if owner is None or field is None:
@@ -103,27 +102,16 @@ def _check_name(
         owner = _describe(context, field.type.nested)
     else:
         part = last
-    if owner and owner.field(part) is None:
+    field = owner.field(part) if owner else None
+    if owner is None:
+        return
+    if field is None:
         error = unknown_field(owner.name, part, [each.name for each in owner.fields])
         yield context.at_key(path, 'unknown-field', str(error), help=error.help)
-
-
-def _check_type(
-    context: CheckContext, made: MessageDescription, value: ExpressionValue, path: DataPath
-) -> Iterator[Diagnostic]:
-    """Check that the value of an expression fits its field."""
-    *outer, last = str(path[-1]).split('.')
-    owner: MessageDescription | None = made
-    for part in outer:
-        nested = owner.field(part) if owner else None
-        owner = _describe(context, nested.type.nested or '') if nested else None
-    field = owner.field(last) if owner else None
-    if owner is None or field is None:
-        return
-    if value.type is None:
+    elif value and value.type is None:
         for finding in check_payload(owner, {last: value.constant}, context.catalogue):
             yield context.at_value(path, finding.rule, finding.message)
-    elif not _may_take(context, field.type, value.type):
+    elif value and value.type and not _may_take(context, field.type, value.type):
         wrong = f'{owner.name}: {last}: expected {field.type}, got {value.type}'
         yield context.at_value(path, 'field-type', wrong)
 

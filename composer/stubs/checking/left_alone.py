@@ -32,7 +32,6 @@ _CAUGHT = frozenset(
         'UndeclaredParameterError',
     }
 )
-_BRANCHES = (ast.If, ast.IfExp, ast.While, ast.Match, ast.BoolOp, ast.Assert)
 # What a node has in one system and not in another.
 _OF_FILE = frozenset({'parameters', 'name'})
 
@@ -159,20 +158,19 @@ class ReportedPlace:
         inner = next((i for i, node in enumerate(chain) if isinstance(node, ast.stmt)), 0)
         part = chain[max(0, inner - 1)] if hasattr(chain[inner], 'body') else chain[inner]
         names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
-        return bool(names & asked) or any(map(_depends_on_file, _branches(chain)))
+        return bool(names & asked) or any(map(_is_of_file, _tests_before(chain)))
 
 
-def _branches(chain: list[ast.AST]) -> Iterator[ast.AST]:
-    """Yield the branches that decide whether the innermost node of a chain is reached."""
+def _tests_before(chain: list[ast.AST]) -> Iterator[ast.expr]:
+    """Yield the conditions that decide whether the innermost node of a chain is reached."""
     for inner, node in itertools.pairwise(chain):
-        is_first = inner in (getattr(node, 'test', None), getattr(node, 'subject', None))
-        is_first |= isinstance(node, ast.BoolOp) and inner is node.values[0]
-        if isinstance(node, _BRANCHES) and not is_first:
-            yield node
-
-
-def _depends_on_file(branch: ast.AST) -> bool:
-    return any(map(_is_of_file, _test(branch)))
+        match node:
+            case ast.BoolOp(values=[first, *_]) if inner is not first:
+                yield from node.values[:-1]
+            case ast.If() | ast.IfExp() | ast.While() | ast.Assert() if inner is not node.test:
+                yield node.test
+            case ast.Match(subject=subject) if inner is not subject:
+                yield subject
 
 
 def _is_of_file(test: ast.AST) -> bool:
@@ -190,15 +188,6 @@ def _is_of_file(test: ast.AST) -> bool:
     return any(map(_is_of_file, children))
 
 
-def _test(branch: ast.AST) -> list[ast.AST]:
-    if isinstance(branch, ast.BoolOp):
-        return [*branch.values[:-1]]
-    if isinstance(branch, ast.Match):
-        return [branch.subject]
-    test = getattr(branch, 'test', None)
-    return [test] if isinstance(test, ast.AST) else []
-
-
 def _asked_names(node: ast.AST) -> list[ast.expr]:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _ASKING:
         return node.args
@@ -211,7 +200,8 @@ def _is_guarded(inner: ast.AST, node: ast.AST) -> bool:
     """Return whether errors in a part of a node are caught, or the part may never run."""
     match node:
         case ast.Try() | ast.TryStar():
-            return inner in node.body and any(map(_catches, node.handlers))
+            types = [each.type for each in node.handlers]
+            return inner in node.body and (None in types or bool(_CAUGHT & words_in(*types)))
         case ast.With() | ast.AsyncWith():
             calls = [each.context_expr for each in node.items]
             names = words_in(*(each for each in calls if isinstance(each, ast.Call)))
@@ -230,7 +220,3 @@ def _is_fixed(test: ast.expr) -> bool:
     if isinstance(test, ast.Constant):
         return True
     return isinstance(test, ast.Name) and (test.id.isupper() or test.id == '__debug__')
-
-
-def _catches(handler: ast.ExceptHandler) -> bool:
-    return handler.type is None or bool(_CAUGHT & words_in(handler.type))

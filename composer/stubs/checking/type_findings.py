@@ -191,14 +191,9 @@ class TypeFindings:
             if owner in _PLAIN_OWNERS:
                 is_typo_of = is_typo_of or self._is_declared(place, node.value)
             if owner == 'Mapping' and is_typo_of:
-                of = ast.unparse(node.value)
-                return (
-                    node,
-                    'unknown-attribute',
-                    f"'{of}' has no attribute '{name}'",
-                    (f"write {of}['{name}']"),
-                )
-            if not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
+                owner = ast.unparse(node.value)
+                advice = f"write {owner}['{name}']"
+            elif not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
                 return None
             advice = OF_RCLPY.get(name, advice)
             return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
@@ -219,23 +214,20 @@ class TypeFindings:
 
         The object is made of just this class, as the file names it.
         """
-        tree = place.syntax.copy.module.tree
+        module, function = place.syntax.copy.module, place.function
         names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
         bound = {(each.module, each.class_name) for each in names}
-        function = place.function
-        receiver = function.args.args[0].arg if function and function.args.args else ''
-        classes = [each for each in ast.walk(tree) if isinstance(each, ast.ClassDef)]
+        receiver = function.args.args[0].arg if function and function.args.args else None
+        classes = [each for each in ast.walk(module.tree) if isinstance(each, ast.ClassDef)]
+        bases = {getattr(base, 'id', '') for each in classes for base in each.bases}
+        own = [each for each in classes if each.name == owner]
         return (
-            (place.syntax.copy.module.name, owner) in bound
-            and isinstance(node.value, ast.Name)
-            and node.value.id == receiver
-            and node.attr not in self.defined
-            and '' not in self.defined
-            and not any(each.name == owner and each.decorator_list for each in classes)
-            and not any(
-                getattr(base, 'id', '') == owner for each in classes for base in each.bases
-            )
-            and any(function in each.body for each in classes if each.name == owner)
+            (module.name, owner) in bound
+            and owner not in bases
+            and getattr(node.value, 'id', '') == receiver
+            and not {node.attr, ''} & self.defined
+            and any(function in each.body for each in own)
+            and not any(each.decorator_list for each in own)
         )
 
     def _unknown_field(self, full_name: str, name: str, node: ast.expr) -> _Problem | None:
@@ -261,7 +253,7 @@ class TypeFindings:
         imports = place.syntax.copy.module.source.imports
         if not isinstance(value, ast.Name):
             return _is_made(imports, value)
-        stored = find_stored(place.function).get(value.id) if place.function else None
+        stored = find_stored(place.function).get(value.id)
         if stored is None:
             use = self._use(place)
             is_received = bool(use and value.id in use.received)
@@ -321,9 +313,6 @@ class TypeFindings:
             if description is None:
                 return None
             return self._misfit(description, field, value, given, is_stored=True)
-        if function == 'list.append' and self.messages.get(wanted) and given in _SCALARS:
-            message = f'expected {self._shown(wanted)}, got {given}'
-            return value, 'field-type', message, None
         return self._passed(place, value, given, wanted, parameter, function)
 
     def _passed(
@@ -443,9 +432,6 @@ class TypeFindings:
         nested = of_type and of_type.nested and self.context.types.describe(of_type.nested)
         if nested and isinstance(value, ast.Dict) and of_type and not of_type.array:
             return self._display(nested, value, given)
-        if nested and of_type and of_type.array and isinstance(value, ast.List | ast.Tuple):
-            entries = [entry for entry in value.elts if isinstance(entry, ast.Dict)]
-            return next(filter(None, (self._display(nested, each, '') for each in entries)), None)
         if of_type and isinstance(value, _DISPLAYS) and not of_type.array:
             if of_type.nested and (not nested or len(nested.fields) <= 1):
                 return None
@@ -706,7 +692,7 @@ def _sources(place: ReportedPlace, name: str) -> list[Stored] | None:
         for target, value, is_item in itertools.chain.from_iterable(map(assignments, loops)):
             if isinstance(target, ast.Name) and target.id == name:
                 return [(value, is_item)]
-    return find_stored(place.function).get(name) if place.function else None
+    return find_stored(place.function).get(name)
 
 
 def _items_given(call: ast.Call | None, function: ast.Lambda) -> ast.expr | None:

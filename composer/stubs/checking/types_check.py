@@ -67,7 +67,7 @@ def find_type_errors(
     own, defined = _own_names(modules)
     findings = TypeFindings(
         context,
-        classes.nodes_by_name(),
+        classes.nodes_by_name,
         classes.shapes_by_name(),
         annotator.functions,
         _message_classes(files),
@@ -89,13 +89,17 @@ def find_type_errors(
 
 @dataclass(slots=True)
 class _Classes:
-    """The classes of nodes, and of nodes together that have a behaviour in common."""
+    """The classes of nodes, and of nodes together that have a behaviour in common.
+
+    Attributes:
+        nodes_by_name: The nodes that each class that was asked for stands for.
+    """
 
     module: str
     shapes: dict[str, NodeShape]
     nodes: list[NodeSpec]
     _names: dict[NodeShape, str] = field(default_factory=dict)
-    _nodes: dict[str, list[NodeSpec]] = field(default_factory=dict)
+    nodes_by_name: dict[str, list[NodeSpec]] = field(default_factory=dict)
 
     def of(self, keys: Iterable[str]) -> tuple[str, str]:
         """Return the module and the name of the class of nodes, by their keys in the file."""
@@ -105,17 +109,13 @@ class _Classes:
             name = 'Or'.join(map(class_name, several[:_MOST_NAMED]))
             taken = name in self._names.values()
             self._names[shape] = f'{name}_{len(self._names)}' if taken else name
-        nodes = self._nodes.setdefault(self._names[shape], [])
+        nodes = self.nodes_by_name.setdefault(self._names[shape], [])
         nodes += [node for node in self.nodes if node.key in several and node not in nodes]
         return f'{SUPPORT}.{self.module}', self._names[shape]
 
     def shapes_by_name(self) -> dict[str, NodeShape]:
         """Return the shape of each class that was asked for."""
         return {name: shape for shape, name in self._names.items()}
-
-    def nodes_by_name(self) -> dict[str, list[NodeSpec]]:
-        """Return the nodes that each class that was asked for stands for."""
-        return self._nodes
 
     def files(self) -> dict[str, str]:
         """Return the stub with the classes that were asked for, by its path."""
