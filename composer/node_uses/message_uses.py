@@ -202,7 +202,9 @@ def _find_problem(
         if isinstance(found, MessageDescription) and name[0] != '[':
             field = found.field(name)
             if field is None:
-                return _unknown(types, found, name, use)
+                wrong, place = explain_unknown(types, found, name), use.module.span_of(use.node)
+                place = place if place.text == name else place.narrowed_to(name)
+                return Problem('unknown-field', wrong[0], place, wrong[1]) if wrong else None
             if use.value is not None and name is use.path[-1]:
                 problems = _Payloads(types, use.module).field(found, field, use.value)
                 return next((each for each in problems if each.rule in _OF_VALUES), None)
@@ -244,19 +246,17 @@ def _never_equal(field_type: FieldType, use: MessageUse) -> Problem | None:
     return Problem('never-equal', text, use.module.span_of(use.compared))
 
 
-def _unknown(
-    types: MessageTypes, owner: MessageDescription, name: str, use: MessageUse
-) -> Problem | None:
+def explain_unknown(
+    types: MessageTypes, owner: MessageDescription, name: str
+) -> tuple[str, str | None] | None:
+    """Return what is wrong with a name that a message does not have, and the help."""
     if name.startswith('_') or name in _OF_CLASSES:
         return None
-    known = types.constants(owner.name)
-    shown, place = in_python(owner.name), use.module.span_of(use.node)
-    place = place if place.text == name else place.narrowed_to(name)
+    known, shown = types.constants(owner.name), in_python(owner.name)
     if name.isupper():
         if types.may_have_constant(owner.name, name):
             return None
         if find_nearest(name, known):
-            text = f"{shown} has no constant '{name}'"
-            return Problem('unknown-field', text, place, suggest(name, known, 'it has'))
+            return f"{shown} has no constant '{name}'", suggest(name, known, 'it has')
     error = unknown_field(shown, name, [each.name for each in owner.fields])
-    return Problem('unknown-field', str(error), place, error.help)
+    return str(error), error.help

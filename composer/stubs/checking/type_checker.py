@@ -47,7 +47,6 @@ missing-argument = true
 missing-attribute = true
 no-matching-overload = true
 not-callable = true
-not-async = true
 not-iterable = true
 read-only = true
 unexpected-keyword = true

@@ -18,11 +18,12 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
+from composer.node_uses.message_uses import explain_unknown
 from composer.node_uses.names import assignments, find_stored
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.python_source.syntax import positional_names, words_in
 from composer.records import record
-from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
+from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
 from composer.stubs.checking.left_alone import CopySyntax, ReportedPlace
 
@@ -56,7 +57,7 @@ _LITERAL = re.compile(r"Literal\[('[^']*'|-?\d+|True|False|b'[^']*')\]")
 _DICT = re.compile(r'^dict\[str, (.*)\]$')
 # A time of rclpy, which a message has beside it.
 _TIME = re.compile(r'^rclpy\.\w+\.(Time|Duration)$')
-_UNARY = re.compile(r'Type `([^`]+)` is not (?:iterable|awaitable)')
+_UNARY = re.compile(r'Type `([^`]+)` is not iterable')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
 _ITEMS = re.compile(r'(?:list|set|tuple)\[([^\[\],]+)\]')
 _INDEXED = re.compile(r'Cannot (?:index into|set item in) `(\w+)[^`]*`')
@@ -139,7 +140,6 @@ class TypeFindings:
             'invalid-yield': self._return,
             'missing-attribute': self._attribute,
             'no-matching-overload': self._argument,
-            'not-async': self._await,
             'not-callable': self._called,
             'not-iterable': self._iteration,
             'unexpected-keyword': self._keyword,
@@ -234,14 +234,8 @@ class TypeFindings:
         description = self.context.types.describe(full_name)
         if description is None or description.field(name) is not None:
             return None
-        constants = [constant.name for constant in description.constants]
-        if name in constants or name.endswith('__DEFAULT'):
-            return None
-        error = unknown_field(
-            in_python(full_name), name, [each.name for each in description.fields]
-        )
-        near = find_nearest(name, constants) if name.isupper() else None
-        return node, 'unknown-field', str(error), did_you_mean(near, error.help)
+        problem = explain_unknown(self.context.types, description, name)
+        return (node, 'unknown-field', *problem) if problem else None
 
     def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value is no union, of which reports name the part that does not fit."""
@@ -592,15 +586,6 @@ class TypeFindings:
         if given[1] not in {'bool', 'float', 'int'} and not self._is_message(given[1]):
             return None
         return values[0], 'bad-call', f'{self._shown(given[1])} is not iterable', None
-
-    def _await(self, place: ReportedPlace) -> _Problem | None:
-        given = _UNARY.search(place.report.message)
-        values = [node for node in place.values if isinstance(node, ast.Await | ast.Call)]
-        if given is None or not values or not self._is_message(given[1]):
-            return None
-        value = values[0].value if isinstance(values[0], ast.Await) else values[0]
-        message = 'what is awaited here is no coroutine'
-        return value, 'missing-await', message, 'leave out the await'
 
     def _called(self, place: ReportedPlace) -> _Problem | None:
         """Return an attribute that is no method, and is called."""
