@@ -53,7 +53,7 @@ def test_every_error_is_found_in_its_line_and_no_other_line(typed):
     here = ('driving.py', number)
     (finding,) = (each for each in by_types if (each.span.source.name, each.span.line) == here)
     assert finding.span.column == line.index('LONGEST') + 1
-    assert finding.message.startswith("sensor_msgs/msg/LaserScan has no constant 'LONGEST'")
+    assert finding.message.startswith("sensor_msgs/msg/LaserScan has no field 'LONGEST'")
 
 
 @pytest.mark.parametrize('file', VALID, ids=lambda file: file.stem)

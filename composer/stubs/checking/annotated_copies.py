@@ -10,6 +10,7 @@ import ast
 import io
 import tokenize
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.entity_kinds import PUBLISHED
@@ -123,6 +124,8 @@ def changed_names(function: FunctionNode) -> set[str]:
     return stored_names(function) | inner
 
 
+# What asks for an attribute that may not be there, or makes it.
+_ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 # The annotations that say less than the class of the node.
 _GENERAL = frozenset({'Node', 'composer.Node', 'Any', 'typing.Any', 'object'})
 
@@ -159,6 +162,53 @@ class AnnotatedCopy:
                 return edit.start + 1
             grown += (len(edit.text) - (edit.end - edit.start)) if column >= begin else 0
         return column - grown
+
+    def start(self, node: ast.AST) -> tuple[int, int]:
+        """Return the line and the column at which a statement or an expression begins."""
+        line, offset = getattr(node, 'lineno', 1), getattr(node, 'col_offset', 0)
+        return line, self._column(line, offset)
+
+    def end(self, node: ast.AST) -> tuple[int, int]:
+        """Return the line and the column after the last character."""
+        line, offset = getattr(node, 'end_lineno', 1), getattr(node, 'end_col_offset', 0)
+        return line, self._column(line, offset)
+
+    def _column(self, line: int, offset: int) -> int:
+        lines = self.module.source.lines
+        return count_characters(lines[line - 1] if line <= len(lines) else '', offset) + 1
+
+    @cached_property
+    def parents(self) -> dict[int, ast.AST]:
+        """What each syntax node is in, by the identity of the node."""
+        nodes = ast.walk(self.module.tree)
+        return {id(child): node for node in nodes for child in ast.iter_child_nodes(node)}
+
+    @cached_property
+    def asked(self) -> frozenset[str]:
+        """The attributes and keys that the module asks for, or makes."""
+        return frozenset(
+            argument.value
+            for node in ast.walk(self.module.tree)
+            for argument in _asked_names(node)
+            if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
+        )
+
+    @cached_property
+    def nodes(self) -> dict[tuple[int, int], list[ast.AST]]:
+        """The statements and expressions that begin at each place, outermost first."""
+        places: dict[tuple[int, int], list[ast.AST]] = {}
+        for node in ast.walk(self.module.tree):
+            if isinstance(node, ast.expr | ast.stmt):
+                places.setdefault(self.start(node), []).append(node)
+        return places
+
+
+def _asked_names(node: ast.AST) -> list[ast.expr]:
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _ASKING:
+        return node.args
+    if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.In | ast.NotIn):
+        return [node.left]
+    return []
 
 
 @dataclass(slots=True)

@@ -10,7 +10,7 @@ import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from composer.python_source.syntax import FUNCTIONS, count_characters, words_in
+from composer.python_source.syntax import FUNCTIONS, words_in
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from composer.stubs.checking.annotated_copies import AnnotatedCopy
     from composer.stubs.checking.type_checker import TypeReport
 
-# What asks for an attribute that may not be there, or makes it.
-_ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 # What asks what a value is.
 _TESTS = frozenset({'hasattr', 'isinstance', 'issubclass', 'callable', 'type'})
 # What a missing name raises, and what these errors are.
@@ -37,67 +35,21 @@ _OF_FILE = frozenset({'parameters', 'name'})
 
 
 @record
-class CopySyntax:
-    """The syntax of a copy, by its places in the original."""
-
-    copy: AnnotatedCopy
-
-    def start(self, node: ast.AST) -> tuple[int, int]:
-        """Return the line and the column at which a statement or an expression begins."""
-        line, offset = getattr(node, 'lineno', 1), getattr(node, 'col_offset', 0)
-        return line, self._column(line, offset)
-
-    def end(self, node: ast.AST) -> tuple[int, int]:
-        """Return the line and the column after the last character."""
-        line, offset = getattr(node, 'end_lineno', 1), getattr(node, 'end_col_offset', 0)
-        return line, self._column(line, offset)
-
-    def _column(self, line: int, offset: int) -> int:
-        lines = self.copy.module.source.lines
-        return count_characters(lines[line - 1] if line <= len(lines) else '', offset) + 1
-
-    @cached_property
-    def parents(self) -> dict[int, ast.AST]:
-        """What each syntax node is in, by the identity of the node."""
-        nodes = ast.walk(self.copy.module.tree)
-        return {id(child): node for node in nodes for child in ast.iter_child_nodes(node)}
-
-    @cached_property
-    def asked(self) -> frozenset[str]:
-        """The attributes and keys that the module asks for, or makes."""
-        return frozenset(
-            argument.value
-            for node in ast.walk(self.copy.module.tree)
-            for argument in _asked_names(node)
-            if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
-        )
-
-    @cached_property
-    def nodes(self) -> dict[tuple[int, int], list[ast.AST]]:
-        """The statements and expressions that begin at each place, outermost first."""
-        places: dict[tuple[int, int], list[ast.AST]] = {}
-        for node in ast.walk(self.copy.module.tree):
-            if isinstance(node, ast.expr | ast.stmt):
-                places.setdefault(self.start(node), []).append(node)
-        return places
-
-
-@record
 class ReportedPlace:
     """The syntax at the place of a report, and whether it is left alone."""
 
-    syntax: CopySyntax
+    copy: AnnotatedCopy
     report: TypeReport
 
     @cached_property
     def _start(self) -> tuple[int, int]:
         line = self.report.line
-        return line, self.syntax.copy.original_column(line, self.report.column)
+        return line, self.copy.original_column(line, self.report.column)
 
     @property
     def nodes(self) -> list[ast.AST]:
         """The syntax nodes that begin where the report is, outermost first."""
-        return self.syntax.nodes.get(self._start, [])
+        return self.copy.nodes.get(self._start, [])
 
     @property
     def values(self) -> list[ast.expr]:
@@ -112,10 +64,10 @@ class ReportedPlace:
     @cached_property
     def around(self) -> list[ast.AST]:
         """The syntax nodes that the report is in, innermost first."""
-        start, end = self.syntax.start, self.syntax.end
+        start, end = self.copy.start, self.copy.end
         found = self.nodes or [
             node
-            for place, nodes in self.syntax.nodes.items()
+            for place, nodes in self.copy.nodes.items()
             for node in nodes
             if place <= self._start <= end(node)
         ]
@@ -124,7 +76,7 @@ class ReportedPlace:
         # Of those that begin together, the inner ones come last.
         _, _, node = max((start(each), index, each) for index, each in enumerate(found))
         chain = [node]
-        while (above := self.syntax.parents.get(id(chain[-1]))) is not None:
+        while (above := self.copy.parents.get(id(chain[-1]))) is not None:
             chain.append(above)
         return chain
 
@@ -186,14 +138,6 @@ def _is_of_file(test: ast.AST) -> bool:
     if is_joined:
         return bool(operands) and all(map(_is_of_file, operands))
     return any(map(_is_of_file, children))
-
-
-def _asked_names(node: ast.AST) -> list[ast.expr]:
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _ASKING:
-        return node.args
-    if isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.In | ast.NotIn):
-        return [node.left]
-    return []
 
 
 def _is_guarded(inner: ast.AST, node: ast.AST) -> bool:

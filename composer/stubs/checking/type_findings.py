@@ -25,7 +25,7 @@ from composer.python_source.syntax import positional_names, words_in
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
-from composer.stubs.checking.left_alone import CopySyntax, ReportedPlace
+from composer.stubs.checking.left_alone import ReportedPlace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,7 +35,12 @@ if TYPE_CHECKING:
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.specs import NodeSpec
     from composer.node_uses.names import Stored
-    from composer.stubs.checking.annotated_copies import FunctionKey, FunctionUse, Received
+    from composer.stubs.checking.annotated_copies import (
+        AnnotatedCopy,
+        FunctionKey,
+        FunctionUse,
+        Received,
+    )
     from composer.stubs.checking.type_checker import TypeReport
     from composer.stubs.node_stubs import NodeShape
 
@@ -110,23 +115,23 @@ class TypeFindings:
     defined: frozenset[str]
 
     def explain_all(
-        self, syntax: CopySyntax, reports: Sequence[TypeReport]
+        self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
     ) -> Iterator[tuple[Diagnostic, range]]:
         """Yield the findings in a module, with the lines of the statements that they are in."""
-        own = {id(node) for node in ast.walk(syntax.copy.module.tree)}
+        own = {id(node) for node in ast.walk(copy.module.tree)}
         for use in self.functions.values():
             # Type checkers take every text for possible where a parameter has choices.
             nodes = ast.walk(use.definition) if id(use.definition) in own else ()
             for choice in filter(None, (self._unknown_choice(use, node) for node in nodes)):
-                finding = self._finding(syntax, use, choice)
+                finding = self._finding(copy, use, choice)
                 line = finding.span.line if finding.span else 0
                 yield finding, range(line, line + 1)
         for report in reports:
-            place = ReportedPlace(syntax, report)
+            place = ReportedPlace(copy, report)
             reader = self._readers.get(report.kind)
             problem = reader(place) if reader and not place.is_left_alone else None
             if problem:
-                yield self._finding(syntax, self._use(place), problem), place.lines
+                yield self._finding(copy, self._use(place), problem), place.lines
 
     @cached_property
     def _readers(self) -> Mapping[str, Callable[[ReportedPlace], _Problem | None]]:
@@ -147,14 +152,14 @@ class TypeFindings:
         }
 
     def _finding(
-        self, syntax: CopySyntax, use: FunctionUse | None, problem: _Problem
+        self, copy: AnnotatedCopy, use: FunctionUse | None, problem: _Problem
     ) -> Diagnostic:
         node, rule, message, advice = problem
         related: list[Related] = []
         for binding, _ in use.bindings[:1] if use else ():
             text = f'{binding.owner} is bound to it here'
             related.append(self.context.related_value(binding.behaviour.path, text))
-        span = _span(syntax, node, rule, message)
+        span = _span(copy, node, rule, message)
         return diagnostic_at(span, rule, message, help=advice, related=related)
 
     def _use(self, place: ReportedPlace) -> FunctionUse | None:
@@ -173,7 +178,7 @@ class TypeFindings:
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
         node, meant = next(found, None), _MEANT.search(place.report.message)
-        if name.startswith('_') or name in place.syntax.asked:
+        if name.startswith('_') or name in place.copy.asked:
             return None
         if not isinstance(node, ast.Attribute) or isinstance(node.ctx, ast.Del):
             return None
@@ -214,7 +219,7 @@ class TypeFindings:
 
         The object is made of just this class, as the file names it.
         """
-        module, function = place.syntax.copy.module, place.function
+        module, function = place.copy.module, place.function
         names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
         bound = {(each.module, each.class_name) for each in names}
         receiver = function.args.args[0].arg if function and function.args.args else None
@@ -244,7 +249,7 @@ class TypeFindings:
         while isinstance(value, ast.Attribute | ast.Subscript):
             value = value.value
         value = value.value if isinstance(value, ast.Await) else value
-        imports = place.syntax.copy.module.source.imports
+        imports = place.copy.module.source.imports
         if not isinstance(value, ast.Name):
             return _is_made(imports, value)
         stored = find_stored(place.function).get(value.id)
@@ -262,7 +267,7 @@ class TypeFindings:
 
         The state is left out: what a name of it stands for may change.
         """
-        imports = place.syntax.copy.module.source.imports
+        imports = place.copy.module.source.imports
         while not isinstance(value, ast.Name):
             match value:
                 case ast.Call(func=ast.Name(id=name)):
@@ -700,9 +705,9 @@ def _certain(given: str) -> set[str] | None:
     return names if names <= _SCALARS else None
 
 
-def _span(syntax: CopySyntax, node: ast.expr, rule: str, message: str) -> Span:
-    source = syntax.copy.module.source.source
-    (line, column), (end_line, end) = syntax.start(node), syntax.end(node)
+def _span(copy: AnnotatedCopy, node: ast.expr, rule: str, message: str) -> Span:
+    source = copy.module.source.source
+    (line, column), (end_line, end) = copy.start(node), copy.end(node)
     if isinstance(node, ast.Attribute) and f"'{node.attr}'" in message:
         return Span(source, end_line, end - len(node.attr), len(node.attr))
     if isinstance(node, ast.Constant) and isinstance(node.value, str) and rule != 'field-type':

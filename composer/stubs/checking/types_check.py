@@ -7,8 +7,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.stubs.checking.annotated_copies import AnnotatedCopy, Annotator, find_received_values
-from composer.stubs.checking.left_alone import CopySyntax
+from composer.stubs.checking.annotated_copies import Annotator, find_received_values
 from composer.stubs.checking.type_checker import run_type_checker
 from composer.stubs.checking.type_findings import TypeFindings
 from composer.stubs.message_stubs import SUPPORT
@@ -24,7 +23,7 @@ from composer.stubs.system_stubs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
     from pathlib import Path
 
     from composer.checks.context import CheckContext
@@ -77,9 +76,16 @@ def find_type_errors(
     )
     every, kept = [], []
     for path, copy in copies.items():
-        told = {*_lines_told(found, copy)}
+        name = copy.module.source.source.name
+        # The lines in which the other checks found something.
+        told = {
+            span.line
+            for finding in found
+            for span in (finding.span, *(related.span for related in finding.related))
+            if span is not None and span.source.name == name
+        }
         reports = [report for report in result.reports if report.path == path]
-        for finding, lines in findings.explain_all(CopySyntax(copy), reports):
+        for finding, lines in findings.explain_all(copy, reports):
             every.append(finding)
             if not told & {*lines}:
                 told.add(lines[0])
@@ -156,12 +162,3 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
                 case ast.Constant(value=str(name)) if name:
                     defined.add(name)
     return frozenset(own), frozenset(defined)
-
-
-def _lines_told(found: list[Diagnostic], copy: AnnotatedCopy) -> Iterator[int]:
-    """Yield the lines of a module in which the other checks found something."""
-    name = copy.module.source.source.name
-    for finding in found:
-        for span in (finding.span, *(related.span for related in finding.related)):
-            if span is not None and span.source.name == name:
-                yield span.line
