@@ -112,17 +112,49 @@ class ReportedPlace:
         names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
         return bool(names & asked) or any(map(_is_of_file, _tests_before(chain)))
 
+    @property
+    def depends_on_file(self) -> bool:
+        """Whether the report comes after a branch that ends its function as the file says.
+
+        Of a branch with the report in it, `is_left_alone` knows.
+        """
+        function, around = self.function, {id(node) for node in self.around}
+        if function is None:
+            return True
+        extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
+        inside = {id(test) for test in _tests_before(self.around)}
+        return any(
+            self.copy.start(node)[0] <= self.report.line
+            and (any(map(_is_of_file, tests)) or extra & words_in(*tests))
+            and (inside & {*map(id, tests)} or (id(node) not in around and _may_end(node)))
+            for node in ast.walk(function)
+            if (tests := _tests_of(node))
+        )
+
+
+def _tests_of(node: ast.AST) -> list[ast.expr]:
+    """Return the conditions of a branch."""
+    match node:
+        case ast.BoolOp(values=[*tests, _]):
+            return tests
+        case ast.If() | ast.IfExp() | ast.While() | ast.Assert():
+            return [node.test]
+        case ast.Match(subject=subject):
+            return [subject]
+    return []
+
+
+def _may_end(branch: ast.AST) -> bool:
+    ends = (ast.Return, ast.Raise, ast.Break, ast.Continue)
+    return isinstance(branch, ast.Assert) or any(isinstance(n, ends) for n in ast.walk(branch))
+
 
 def _tests_before(chain: list[ast.AST]) -> Iterator[ast.expr]:
     """Yield the conditions that decide whether the innermost node of a chain is reached."""
     for inner, node in itertools.pairwise(chain):
-        match node:
-            case ast.BoolOp(values=[first, *_]) if inner is not first:
-                yield from node.values[:-1]
-            case ast.If() | ast.IfExp() | ast.While() | ast.Assert() if inner is not node.test:
-                yield node.test
-            case ast.Match(subject=subject) if inner is not subject:
-                yield subject
+        tests = _tests_of(node)
+        if inner not in tests[:1]:
+            yield from tests
 
 
 def _is_of_file(test: ast.AST) -> bool:

@@ -76,10 +76,10 @@ _PARTS = {
 }
 _INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 _SECTIONS = {
-    'publish': ('publishers', ''),
-    'call': ('service_clients', '_Request'),
-    'call_async': ('service_clients', '_Request'),
-    'send_goal': ('action_clients', '_Goal'),
+    'publish': ('publishers', 'publisher', ''),
+    'call': ('service_clients', 'service client', '_Request'),
+    'call_async': ('service_clients', 'service client', '_Request'),
+    'send_goal': ('action_clients', 'action client', '_Goal'),
 }
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
@@ -202,9 +202,12 @@ class TypeFindings:
                 return None
             advice = OF_RCLPY.get(name, advice)
             return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
-        # The walk of behaviours finds names that nodes do not have.
-        if of_node in self.nodes or not self._is_of_one_type(place, node.value):
+        if not self._is_of_one_type(place, node.value):
             return None
+        if of_node in self.nodes:
+            # The walk of behaviours finds other names that nodes do not have.
+            is_found = owner != f'{of_node}Parameters' or place.depends_on_file
+            return None if is_found else self._unknown_parameter(of_node, name, node)
         if owner in self.messages and not is_part:
             full_name = self.messages[owner]
             return self._unknown_field(full_name, name, node) if full_name else None
@@ -234,6 +237,12 @@ class TypeFindings:
             and any(function in each.body for each in own)
             and not any(each.decorator_list for each in own)
         )
+
+    def _unknown_parameter(self, owner: str, name: str, node: ast.expr) -> _Problem:
+        message = f"node '{self.nodes[owner][0].name}' declares no parameter '{name}'"
+        known = [each for each, _ in self.shapes[owner].parameters]
+        advice = suggest(name, known, None, "declare it under 'parameters:'")
+        return node, 'unknown-parameter', message, advice
 
     def _unknown_field(self, full_name: str, name: str, node: ast.expr) -> _Problem | None:
         description = self.context.types.describe(full_name)
@@ -361,7 +370,7 @@ class TypeFindings:
         name, payload = values.get('name'), values.get('payload')
         if None in keywords or name is None:
             return None
-        section, part = _SECTIONS[method]
+        section, noun, part = _SECTIONS[method]
         known = dict(getattr(self.shapes[owner], section))
         if not isinstance(name, ast.Constant):
             is_swapped = isinstance(payload, ast.Constant) and payload.value in known
@@ -369,7 +378,12 @@ class TypeFindings:
                 return None
             message = f'{method}(name, payload) takes the name first, got {given}'
             return name, 'bad-call', message, 'swap the arguments'
-        types = known.get(name.value, ())
+        if name.value not in known:
+            if '' in known or place.depends_on_file:
+                return None
+            message = f"node '{self.nodes[owner][0].name}' declares no {noun} {name.value!r}"
+            return name, f'unknown-{noun.replace(" ", "-")}', message, suggest(name.value, known)
+        types = known[name.value]
         if payload is None or len(types) != 1 or not types[0]:
             return None
         return self._payload(f'{types[0]}{part}', payload, given)
