@@ -321,6 +321,9 @@ class TypeFindings:
             if description is None:
                 return None
             return self._misfit(description, field, value, given, is_stored=True)
+        if function == 'list.append' and self.messages.get(wanted) and given in _SCALARS:
+            message = f'expected {self._shown(wanted)}, got {given}'
+            return value, 'field-type', message, None
         return self._passed(place, value, given, wanted, parameter, function)
 
     def _passed(
