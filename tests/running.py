@@ -23,6 +23,8 @@ PATIENCE_SEC = 8.0
 
 # Domains of DDS whose ports lie below the range that Linux gives to outgoing connections.
 _FIRST_DOMAIN, _DOMAINS = 10, 91
+# Threads of behaviours have the names that Python gives them.
+_DEAD = re.compile(r'Exception in thread (?!Thread-\d+ \((?!_))')
 _domain_offsets = count(os.getpid() * 7)
 _peers = []
 
@@ -195,7 +197,13 @@ class Child:
 
 
 class Composing:
-    """Writes systems into a folder and runs them; `domain_id` is theirs."""
+    """Writes systems into a folder and runs them; `domain_id` is theirs.
+
+    Attributes:
+        may_lose_threads: Whether their behaviours end threads of Composer.
+    """
+
+    may_lose_threads = False
 
     def __init__(self, folder, domain_id):
         self.folder = folder
@@ -227,6 +235,9 @@ class Composing:
     def end(self):
         for child in self._children:
             child.end()
+        # A thread that dies is seen only by what it no longer does.
+        dead = [line for child in self._children for line in child.lines if _DEAD.match(line)]
+        assert not dead or self.may_lose_threads, f'threads of Composer died: {dead}'
 
 
 class Peer:

@@ -120,7 +120,7 @@ def test_a_stop_ends_a_delay(compose):
     child = compose(system(processes, n={'delay': 3600, 'on_start': 'parts:starts'}), CODE)
     child.wait_for_line('[now] now')
 
-    assert child.stop(signal.SIGTERM) == 0
+    assert child.stop(signal.SIGTERM, once_up=False) == 0
     assert not child.matching('starts')
 
 
