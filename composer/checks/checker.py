@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
@@ -20,9 +21,9 @@ from composer.checks.behaviours.shipped_behaviours import (
 )
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.connections.channels import check_channel_types, check_servers
+from composer.checks.connections.cycles import check_loops
 from composer.checks.connections.deadlocks import check_deadlocks
 from composer.checks.connections.lifecycles import check_awaited_states, check_lifecycles
-from composer.checks.connections.loops import check_loops
 from composer.checks.connections.qos import check_deadlines, check_qos_pairs
 from composer.checks.connections.remap_rules import check_remap_rules
 from composer.checks.connections.typos import check_typos
@@ -37,7 +38,7 @@ from composer.checks.messages import check_messages
 from composer.checks.names import check_full_names, check_names
 from composer.checks.parameter_files import check_parameter_files
 from composer.checks.parameters import check_parameters
-from composer.checks.placement.crossing_messages import check_crossing_messages
+from composer.checks.placement.crossings import check_crossing_messages
 from composer.checks.placement.hosts_and_workers import check_hosts, check_workers
 from composer.checks.placement.inventory import check_inventory, check_network_keys
 from composer.checks.placement.network_paths import check_network
@@ -52,7 +53,6 @@ from composer.checks.references import (
     check_start_values,
     check_types,
 )
-from composer.checks.repeated import say_once
 from composer.diagnostics import errors_first, has_errors
 from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.declared_packages import load_declared
@@ -64,13 +64,13 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.interfaces.catalogue import InterfaceCatalogue
     from composer.language.loaded_system import LoadedSystem
+    from composer.language.specs import SystemSpec
     from composer.rules import Need
 
 CheckRule: TypeAlias = 'Callable[[CheckContext], Iterable[Diagnostic]]'
 FurtherCheck: TypeAlias = 'Callable[[CheckContext, list[Diagnostic]], Iterable[Diagnostic]]'
 FurtherChecks: TypeAlias = 'Mapping[Need, FurtherCheck]'
 SpansByLine: TypeAlias = 'dict[tuple[SourceFile, int], list[Span]]'
-
 NODE_RULES: tuple[CheckRule, ...] = (
     check_names,
     check_qos,
@@ -135,6 +135,8 @@ _ENOUGH = MAX_FINDINGS + 1
 # What only some runs look at.
 _OPTIONAL: frozenset[Need] = frozenset({'import', 'types'})
 _MORE = f'only the first {MAX_FINDINGS} findings are shown: fix them to see the others'
+# Numbers and words apart, as `wheel`, `2` and `left` in `wheel2_left`.
+_TOKEN = re.compile(r'\d+|[^\W\d_]+')
 
 
 def create_context(
@@ -276,3 +278,55 @@ def _hangs_on_samples(finding: Diagnostic, samples: SpansByLine) -> bool:
         span.column <= place.column < span.column + span.length
         for span in samples.get((place.source, place.line), ())
     )
+
+
+def say_once(findings: Iterable[Diagnostic], system: LoadedSystem) -> list[Diagnostic]:
+    """Return findings, those at one place that differ only in the instance as one.
+
+    The first of them stays, and says how many there are.
+    """
+    groups: dict[tuple[object, ...], list[Diagnostic]] = {}
+    for finding in findings:
+        groups.setdefault((finding.rule, finding.file, finding.span), []).append(finding)
+    tokens: set[str] | None = None
+    said: list[Diagnostic] = []
+    for group in groups.values():
+        if len(group) > 1 and group[0].span:
+            tokens = _tokens_of_instances(system) if tokens is None else tokens
+            said += _merge(group, tokens)
+        else:
+            said += group
+    return said
+
+
+def _merge(group: list[Diagnostic], tokens: set[str]) -> Iterator[Diagnostic]:
+    alike: dict[str, list[Diagnostic]] = {}
+    for finding in group:
+        shape = _TOKEN.sub(lambda match: '*' if match[0] in tokens else match[0], finding.message)
+        alike.setdefault(shape, []).append(finding)
+    for first, *others in alike.values():
+        count = len({each.message for each in others} - {first.message})
+        plural = 's' if count > 1 else ''
+        more = f' (and the same for {count} more instance{plural})' if count else ''
+        yield replace(first, message=first.message + more)
+
+
+def _tokens_of_instances(system: LoadedSystem) -> set[str]:
+    """Return what differs in the names of entries that are written in one place."""
+    places: dict[Span, list[set[str]]] = {}
+    for spec in filter(None, (system.spec, system.unused)):
+        for path, name in _named_entries(spec):
+            found = {*_TOKEN.findall(name)}
+            places.setdefault(system.positions.key(path), []).append(found)
+    differing: set[str] = set()
+    for names in places.values():
+        common = names[0].intersection(*names)
+        differing.update(*(each - common for each in names))
+    return differing
+
+
+def _named_entries(spec: SystemSpec) -> Iterator[tuple[tuple[str, ...], str]]:
+    for key, node in spec.nodes.items():
+        yield ('nodes', key), f'{key} {node.full_name}'
+    for key in spec.processes:
+        yield ('processes', key), key

@@ -20,13 +20,13 @@ from jinja2 import (
     TemplateRuntimeError,
     TemplateSyntaxError,
     UndefinedError,
+    nodes,
 )
 from jinja2.exceptions import SecurityError
 
 from composer.confidential import hide, origin_of
 from composer.diagnostics import Diagnostic, Related, diagnostic_at
 from composer.expressions import ARGUMENTS, written_in_expression
-from composer.expressions.comparisons import find_useless_comparisons
 from composer.expressions.evaluation import UnknownArgumentError, evaluate_expression
 from composer.expressions.functions import PackageError
 from composer.expressions.sandbox import Sandbox
@@ -37,6 +37,8 @@ from composer.spelling import find_nearest, suggest
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from composer.diagnostics import Span
     from composer.expressions.scope import Scope
     from composer.yaml_text.document import Document
@@ -47,13 +49,13 @@ _UNKNOWN_FILTER = re.compile(r"there is no filter '(\w+)'")
 _ENV = re.compile(r"""\benv\(\s*['"]([^'"]*)['"]""")
 # Beyond this no number is even a double; much longer ones Python will not print.
 _MAX_BITS = 1024
-
 # The nearest name is searched for so many undefined ones: each search takes a millisecond.
 _MOST_SEARCHED = 100
-
-
 # Where `none` is no value of its own.
 _MAY_LACK_VALUES = (('processes',), ('containers',), ('environment',))
+_EQUALITIES = ('eq', 'ne')
+_MEMBERSHIPS = ('in', 'notin')
+_NUMBERS = (bool, int, float)
 
 
 class TemplateEvaluator:
@@ -341,3 +343,41 @@ def _as_data(value: Any) -> Any:
 def _as_text(value: Any) -> str:
     """Return a value inside a text as YAML writes it, and nothing for null."""
     return '' if value is None else format_scalar(value)
+
+
+def find_useless_comparisons(
+    expression: nodes.Expr, scope: Scope
+) -> Iterator[tuple[str, str, str | None]]:
+    """Yield each value that an argument never has: what is wrong, the value as text, and help."""
+    found = [*expression.find_all(nodes.Compare)]
+    for compare in [*found, *([expression] if isinstance(expression, nodes.Compare) else [])]:
+        operand = compare.ops[0]
+        sides = (compare.expr, operand.expr)
+        for one, other in (sides, sides[::-1]) if operand.op in _EQUALITIES else ():
+            yield from _compare(one, [other], scope)
+        if operand.op in _MEMBERSHIPS and isinstance(operand.expr, nodes.List | nodes.Tuple):
+            yield from _compare(compare.expr, operand.expr.items, scope)
+
+
+def _compare(
+    side: nodes.Node, others: list[nodes.Expr], scope: Scope
+) -> Iterator[tuple[str, str, str | None]]:
+    name = side.name if isinstance(side, nodes.Name) else ''
+    if name not in scope.arguments or scope.values.get(name) is None:
+        return
+    value, choices = scope.values[name], scope.choices.get(name, ())
+    for other in others:
+        if isinstance(other, nodes.List | nodes.Tuple | nodes.Dict):
+            yield f"'{name}' is {type(value).__name__}, and is never equal to a list", '', None
+        if not isinstance(other, nodes.Const) or other.value is None:
+            continue
+        if _kind(value) != _kind(other.value):
+            kinds = f'{type(value).__name__}, and is never equal to {other.value!r}'
+            yield f"'{name}' is {kinds}", str(other.value), 'compare it with a value of its type'
+        elif choices and other.value not in choices:
+            text = f"'{name}' is never {other.value!r}"
+            yield text, str(other.value), suggest(other.value, choices, 'its choices are')
+
+
+def _kind(value: Any) -> type:
+    return float if isinstance(value, _NUMBERS) else type(value)

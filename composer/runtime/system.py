@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from composer.errors import ExitCode
+from composer.errors import ExitCode, StartError
 from composer.names import count_of
 from composer.planning.differences import compare
 from composer.runtime.health.introductions import Introductions
 from composer.runtime.health.other_hosts import OtherHosts
-from composer.runtime.hold import wait_until_let_go
 from composer.runtime.local_part import LocalPart
 from composer.runtime.logs import system_logger
 from composer.runtime.workers.workers import no_workers
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 # How long a worker may take to hand its trace over.
 _TRACE_SEC = 10.0
+_POLL_SEC = 0.02
+# Who has forgotten it does not come back.
+_LONGEST_HOLD_SEC = 60.0
 
 
 class System(LocalPart):
@@ -234,3 +238,32 @@ def _describe_parts(**counts: int) -> str:
     parts = [count_of(number, noun) for noun, number in counts.items() if number]
     *first, last = parts or ['0 nodes']
     return f'{", ".join(first)} and {last}' if first else last
+
+
+def wait_until_let_go(path: Path, is_stopping: Callable[[], bool]) -> None:
+    """Write the process ID to a file, and wait until the file is gone; without it, do nothing.
+
+    So the parts of a system on several hosts start their behaviours together: who starts them
+    waits until each is held, and removes the files.
+
+    Args:
+        is_stopping: Returns whether to wait no longer.
+
+    Raises:
+        StartError: It was there for too long, and is removed; or it cannot be written.
+    """
+    try:
+        with path.open('r+') as stream:
+            stream.write(f'{os.getpid()}\n')
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        message = f'the system cannot tell that it is held: {path}: {error.strerror}'
+        raise StartError(message) from error
+    deadline = time.monotonic() + _LONGEST_HOLD_SEC
+    while path.exists() and not is_stopping():
+        if time.monotonic() > deadline:
+            path.unlink(missing_ok=True)
+            message = f'nobody has removed {path} within {_LONGEST_HOLD_SEC:g} s'
+            raise StartError(message)
+        time.sleep(_POLL_SEC)

@@ -6,7 +6,7 @@ The schema (JSON Schema 2020-12) is the one description of the structure, for ed
 from __future__ import annotations
 
 import json
-from functools import cache
+from functools import cache, cached_property
 from itertools import islice, takewhile
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +14,13 @@ from composer.entity_kinds import KIND_OF_SECTION
 from composer.input_limits import MAX_FINDINGS
 from composer.schema import SCHEMA_NAME, schema_path
 from composer.schema.explanations import explain
-from composer.schema.validator import SchemaValidator
 from composer.yaml_text.document import copy_data
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from jsonschema.exceptions import ValidationError
+    from jsonschema_rs import Validator
 
     from composer.diagnostics import Diagnostic
     from composer.schema.violations import Violation
@@ -27,10 +29,8 @@ if TYPE_CHECKING:
 
 # Editors accept an expression in place of a value; here, expressions are evaluated already.
 _TEMPLATE = {'$ref': '#/$defs/template'}
-
 # The values for missing keys of the file, once they are reported.
 _REQUIRED: dict[str, Any] = {'version': 1, 'nodes': {}}
-
 # Sections whose entries have keys that count before the check, and their definitions.
 _OUTER_SECTIONS = {
     'args': 'argument',
@@ -43,6 +43,7 @@ _OUTER_SECTIONS = {
 }
 _DEPTH_OF_ENTRIES = 3
 _DEPTH_OF_ENTITIES = 5
+_ROOT = '#'
 
 
 def check_structure(document: Document) -> None:
@@ -271,3 +272,74 @@ def _child(data: Any, key: Key) -> Any:
 def _schema(name: str = SCHEMA_NAME) -> SchemaValidator:
     text = schema_path(name).read_text(encoding='utf-8')
     return SchemaValidator(without_templates(json.loads(text)))
+
+
+class SchemaValidator:
+    """The validator of one schema.
+
+    The verdict is that of jsonschema. It accepts all that jsonschema-rs accepts, and some more:
+    letters of all scripts in patterns, for one.
+
+    Attributes:
+        schema: The schema itself.
+    """
+
+    def __init__(self, schema: dict[str, Any]) -> None:
+        self.schema = schema
+        self._quick: dict[str, Validator] = {}
+        try:
+            import jsonschema_rs
+        except ImportError:  # There are wheels for x86-64 and aarch64.
+            self._quick_class = None
+        else:
+            self._quick_class = jsonschema_rs.Draft202012Validator
+
+    def is_surely_valid(self, data: Any, reference: str = _ROOT) -> bool:
+        """Return whether data are known to be valid, without an error to explain.
+
+        Args:
+            reference: A definition, as in `#/$defs/node`; the whole schema otherwise.
+        """
+        if self._quick_class is None:
+            return False
+        if reference not in self._quick:
+            part = {'$ref': reference, '$defs': self.schema['$defs']}
+            schema = self.schema if reference == _ROOT else part
+            self._quick[reference] = self._quick_class(schema)
+        try:
+            return self._quick[reference].is_valid(data)
+        except ValueError:  # YAML has more than JSON, as keys that are numbers.
+            return False
+
+    def iter_errors(self, data: Any) -> Iterator[ValidationError]:
+        """Yield what is not valid."""
+        errors: Iterator[ValidationError] = self._explaining.iter_errors(data)
+        return errors
+
+    @cached_property
+    def _explaining(self) -> Any:
+        # Importing it takes a fifth of a check's time, and most files are valid.
+        from jsonschema import Draft202012Validator
+        from jsonschema.exceptions import ValidationError
+        from jsonschema.validators import extend
+
+        check_fully = Draft202012Validator.VALIDATORS['$ref']
+
+        def check_reference(
+            validator: Any, reference: str, instance: object, part: object
+        ) -> Iterable[ValidationError]:
+            """Pass over valid parts of the data."""
+            if self.is_surely_valid(instance, reference):
+                return ()
+            return check_fully(validator, reference, instance, part) or ()
+
+        def check_maximum(
+            validator: Any, maximum: float, instance: Any, _schema: object
+        ) -> Iterator[ValidationError]:
+            """As in JSON Schema, but a NaN is beyond every maximum: JSON has none, YAML has."""
+            if validator.is_type(instance, 'number') and not instance <= maximum:
+                text = f'{instance!r} is greater than the maximum of {maximum!r}'
+                yield ValidationError(text)
+
+        keywords = {'$ref': check_reference, 'maximum': check_maximum}
+        return extend(Draft202012Validator, keywords)(self.schema)

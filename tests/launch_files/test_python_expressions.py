@@ -6,7 +6,7 @@ import pytest
 
 from composer.expressions.evaluation import evaluate_expression
 from composer.expressions.sandbox import Sandbox
-from composer.launch_files.python_expressions import UnlikeError, translate
+from composer.launch_files.substitutions import UnlikeError, translate
 from composer.launch_files.texts import Text, one
 
 NAMES = {'mode': 'race', 'count': '3', 'sim': 'True'}

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from composer.planning.class_code import find_class_code
+from composer.planning.snapshot_taking import find_class_code
 
 SOURCE = """
 import math

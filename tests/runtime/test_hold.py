@@ -53,7 +53,7 @@ def test_a_system_that_is_held_can_be_stopped(compose, hold, wait_for):
 
 def test_a_system_that_nobody_lets_go_ends(compose, hold, monkeypatch, tmp_path):
     (tmp_path / 'sitecustomize.py').write_text(
-        'import composer.runtime.hold as hold\nhold._LONGEST_SEC = 0.3\n'
+        'import composer.runtime.system as hold\nhold._LONGEST_HOLD_SEC = 0.3\n'
     )
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     child = compose(SYSTEM, CODE, '--hold', hold)

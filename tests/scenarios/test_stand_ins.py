@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from composer.scenarios.stand_ins import PayloadError, compute_payload
+from composer.scenarios.running.stand_in_servers import PayloadError, compute_payload
 from tests.scenarios.expectations.plain_messages import number, scan
 
 

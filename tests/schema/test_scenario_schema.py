@@ -13,7 +13,7 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
 from composer.schema import SCENARIO_SCHEMA_NAME, schema_path
-from composer.schema.validator import SchemaValidator
+from composer.schema.structure import SchemaValidator
 
 SCHEMA = json.loads(schema_path(SCENARIO_SCHEMA_NAME).read_text())
 CATALOGUE = InterfaceCatalogue()

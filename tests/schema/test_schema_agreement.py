@@ -16,8 +16,7 @@ from jsonschema import Draft202012Validator
 import composer
 from composer.language.pipeline import load_system_text
 from composer.schema import schema_path, structure
-from composer.schema.structure import without_templates
-from composer.schema.validator import SchemaValidator
+from composer.schema.structure import SchemaValidator, without_templates
 
 SCHEMA = json.loads(schema_path().read_text())
 EDITOR = Draft202012Validator(SCHEMA)

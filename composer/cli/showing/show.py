@@ -1,18 +1,22 @@
-"""`composer show`: print the final system, its arguments, or its parameters."""
+"""`composer show`: print the final system, its arguments, or its parameters.
+
+Comments that silence rules are kept where a check of the output would find more without them than
+a check of the files.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from composer.application.file_selection import load_given
 from composer.application.output import show_findings
-from composer.checks.checker import create_context
+from composer.checks.checker import check_system, create_context
 from composer.checks.parameter_files import check_parameter_files
-from composer.cli.showing.show_comments import append_comments, find_kept_comments
 from composer.confidential import origin_of
 from composer.diagnostics import has_errors
 from composer.errors import ExitCode
@@ -21,20 +25,22 @@ from composer.language.arguments import describe_arguments
 from composer.language.parameter_files import names_used, read_given_file
 from composer.language.parsing.container_parser import unfold_containers
 from composer.language.paths import with_folder
+from composer.language.pipeline import load_system_text
 from composer.language.values.start_reader import StartValueReader
 from composer.language.values.start_values import replace_start_values
 from composer.ros_parameters.file_writer import render_parameter_file
 from composer.ros_parameters.overrides import find_overrides
+from composer.yaml_text.comments import read_ignore_comments
 from composer.yaml_text.writer import Expression, render_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from composer.diagnostics import Diagnostic
+    from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.language.loaded_system import LoadedSystem
     from composer.language.specs import NodeSpec
-    from composer.yaml_text.positions import DataPath
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 # Keys that have no meaning any more once a system is resolved.
 _RESOLVED_KEYS = ('args', 'vars', 'check', 'max_nodes')
@@ -204,3 +210,60 @@ def _hidden(value: Any) -> Any:
 def _absolute(path: str) -> str:
     # Not `Path.resolve`: symbolic links stay as they are written.
     return path if path.startswith('package://') else os.path.abspath(path)  # noqa: PTH100
+
+
+def find_kept_comments(system: LoadedSystem, text: str) -> dict[int, str]:
+    """Return the comments to print, by line number.
+
+    Args:
+        text: The output without comments.
+    """
+    silenced = _find_silenced(system.positions.sources())
+    if not silenced:
+        return {}
+    shown = load_system_text(text, system.path, [])
+    places = _paths_by_line(shown.positions)
+    rules: dict[int, set[str]] = defaultdict(set)
+    for finding in check_system(shown, InterfaceCatalogue()):
+        span = finding.span
+        if span is None or span.source is not shown.positions.source:
+            continue
+        written = _lines_of(system.positions, places[span.line])
+        if any(finding.rule in silenced.get(each, ()) for each in written):
+            rules[span.line].add(finding.rule)
+    return {line: f'# composer: ignore[{", ".join(sorted(rules[line]))}]' for line in rules}
+
+
+def append_comments(text: str, comments: Mapping[int, str]) -> str:
+    """Return a text with comments at the ends of its lines, given by line number."""
+    lines = text.splitlines(keepends=True)
+    for number, comment in comments.items():
+        line = lines[number - 1].rstrip('\n')
+        lines[number - 1] = f'{line}  {comment}\n'
+    return ''.join(lines)
+
+
+def _find_silenced(sources: Iterable[SourceFile]) -> dict[tuple[SourceFile, int], set[str]]:
+    """Return the rules that comments name, by file and line."""
+    found: dict[tuple[SourceFile, int], set[str]] = {}
+    for source in sources:
+        for comment in read_ignore_comments(source):
+            rules = {rule.text for rule in comment.rules}
+            found.setdefault((source, comment.span.line), set()).update(rules)
+    return found
+
+
+def _paths_by_line(positions: SourceMap) -> dict[int, list[DataPath]]:
+    paths: dict[int, list[DataPath]] = defaultdict(list)
+    for spans in (positions.keys, positions.values):
+        for path, span in spans.items():
+            paths[span.line].append(path)
+    return paths
+
+
+def _lines_of(positions: SourceMap, paths: Iterable[DataPath]) -> set[tuple[SourceFile, int]]:
+    """Return the files and lines in which the keys and values at some paths were written."""
+    spans: set[Span] = set()
+    for path in paths:
+        spans |= {positions.key(path), positions.value(path)}
+    return {(span.source, span.line) for span in spans}

@@ -11,8 +11,7 @@ import click
 
 from composer import signals
 from composer.application.output import show_findings, wants_colour, write_file
-from composer.application.test_runs.case_plan import plan_cases
-from composer.application.test_runs.case_runs import CaseRuns
+from composer.application.test_runs.case_runs import CaseRuns, plan_cases
 from composer.application.test_runs.name_expressions import parse_name_expression
 from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN, select_scenarios
 from composer.errors import ExitCode
@@ -27,7 +26,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from composer.application.test_runs.case_plan import CasePlan
+    from composer.application.test_runs.case_runs import CasePlan
     from composer.application.test_runs.name_expressions import Condition
     from composer.application.test_runs.run_options import RunOptions
     from composer.reports.report import CaseReport

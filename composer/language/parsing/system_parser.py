@@ -1,21 +1,30 @@
-"""A system as data that satisfy the schema → its spec."""
+"""A system and its nodes, as data that satisfy the schema → their specs."""
 
 from __future__ import annotations
 
 import marshal
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from composer.entity_kinds import NODE_BEHAVIOURS
 from composer.language.loaded_system import PARTS
+from composer.language.parameter_files import parse_parameter_files
+from composer.language.parsing.condition_parser import parse_conditions
 from composer.language.parsing.container_parser import (
     LOADING_DEFINITIONS,
     LOADING_PACKAGE,
     is_container,
 )
-from composer.language.parsing.entry_parser import Data, Spec, parse_entries, parse_qos
-from composer.language.parsing.node_parser import parse_node
+from composer.language.parsing.entity_parser import parse_entities, parse_run_options
+from composer.language.parsing.entry_parser import (
+    Data,
+    Spec,
+    parse_behaviour,
+    parse_entries,
+    parse_qos,
+)
 from composer.language.parsing.parameter_references import fill_in
 from composer.language.parsing.process_parser import parse_process
 from composer.language.parsing.worker_parser import (
@@ -28,10 +37,14 @@ from composer.language.parsing.worker_parser import (
 from composer.language.specs import (
     DEFAULT_DIAGNOSTICS_PERIOD_SEC,
     DEFAULT_SHUTDOWN_TIMEOUT_SEC,
+    BehaviourSpec,
+    LifecycleStart,
+    NodeSpec,
     QosSpec,
     SystemSpec,
 )
 from composer.language.values.start_values import StartValues, fill_start_values
+from composer.names import expand_namespace
 from composer.yaml_text.scalars import format_scalar
 
 if TYPE_CHECKING:
@@ -42,13 +55,13 @@ if TYPE_CHECKING:
     from composer.language.specs import ProcessSpec
     from composer.yaml_text.positions import DataPath
 
-
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _DEPTH_OF_ENTITIES = 4
 _BOND = 'bond'
 _PACKAGES = Path(__file__).parents[2] / 'interfaces' / 'packages'
 # The last version in which equal data are written alike, whoever else holds them.
 _MARSHAL_VERSION = 2
+_PLAIN_KEYS = [each.name for each in fields(NodeSpec) if each.default is not MISSING]
 
 
 def parse_specs(system: LoadedSystem, before: LoadedSystem | None = None) -> None:
@@ -215,3 +228,46 @@ def _parse_diagnostics(data: bool | Data) -> float | None:  # noqa: FBT001 - as 
 
 def _parse_named_qos(name: str, data: Data, path: DataPath) -> QosSpec:  # noqa: ARG001 - a parser of entries
     return parse_qos(data, path)
+
+
+def parse_node(key: str, data: Data, path: DataPath) -> NodeSpec:
+    """Return the node that the file calls `key`, which may be its full name."""
+    namespace, _, name = key.rpartition('/')
+    if not key.startswith('/'):
+        namespace, name = expand_namespace(data.get('namespace', '')), key
+    return NodeSpec(
+        name=name,
+        namespace=namespace or '/',
+        state=MappingProxyType(data.get('state', {})),
+        remap=tuple(data.get('remap', {}).items()),
+        lifecycle=_parse_lifecycle(data.get('lifecycle', False)),
+        wait_for=parse_conditions(data, path),
+        delay_sec=float(data.get('delay', 0.0)),
+        parameter_files=parse_parameter_files(data),
+        followed=(),
+        path=path,
+        **{key: data[key] for key in _PLAIN_KEYS if key in data},
+        **_parse_hooks(data, path),
+        **parse_entities(data, path),
+        **parse_run_options({}, data),
+    )
+
+
+def _parse_hooks(data: Data, path: DataPath) -> dict[str, Any]:
+    return {each.key: _parse_hook(data, path, each.key) for each in NODE_BEHAVIOURS}
+
+
+def _parse_lifecycle(data: bool | Data) -> LifecycleStart | None:  # noqa: FBT001 - as it is written
+    if data is False:
+        return None
+    full: Data = data if isinstance(data, dict) else {}
+    start: LifecycleStart = full.get('start', 'unconfigured')
+    return start
+
+
+def _parse_hook(node: Data, path: DataPath, key: str) -> BehaviourSpec | None:
+    data = node.get(key)
+    if not isinstance(data, str):
+        return parse_behaviour(data, (*path, key)) if data else None
+    spec = parse_behaviour({'behaviour': data}, path)
+    return spec and replace(spec, path=(*path, key))

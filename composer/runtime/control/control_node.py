@@ -2,10 +2,15 @@
 
 It needs nothing of the executor of the system, so hanging behaviours stop neither. It is created
 when the system is up, or takes long to come up, and so delays no start.
+
+Tools that know containers, as `ros2 component list`, look for a node that is not hidden and has
+all three services of one. The system has what its files say: to load and unload is refused.
+Source: `find_container_node_names` in ros2cli (`ros2component/ros2component/api/__init__.py`).
 """
 
 from __future__ import annotations
 
+import itertools
 import threading
 from importlib.util import find_spec
 from time import monotonic, sleep
@@ -22,16 +27,16 @@ from composer.runtime.control.answers import (
     status_answer,
     top_answer,
 )
-from composer.runtime.control.component_listing import ComponentListing
 from composer.runtime.control.control_services import ControlServices
 from composer.runtime.control.name_claim import NameClaim
+from composer.runtime.control.protocol import container_name
 from composer.runtime.health.diagnostics_publisher import CallWatcher, DiagnosticsPublisher
 from composer.runtime.health.system_state import Outcome, find_log
 from composer.runtime.logs import system_logger
 from composer.runtime.system_executor import SystemExecutor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rclpy.context import Context
 
@@ -44,6 +49,7 @@ _LATEST_SEC = 0.5
 _STOP_SEC = 1.0
 # How long an answer may take to whoever asked, before the node goes.
 _ANSWER_SEC = 0.1
+_REFUSAL = "the nodes of a system are those of its file: edit it, then 'composer reload {}'"
 
 
 class ControlNode:
@@ -257,3 +263,49 @@ class ControlNode:
         known = [f'{key} {rival[key]}' for key in ('host', 'pid', 'file') if key in rival]
         domain = f'ROS_DOMAIN_ID {self._context.get_domain_id()}'
         return f'{what} ({", ".join([domain, *known])})'
+
+
+class ComponentListing:
+    """The node of a system that says which nodes are in its process.
+
+    Args:
+        list_nodes: Returns their full names.
+
+    Attributes:
+        node: The rclpy node.
+    """
+
+    def __init__(self, context: Context, system: str, list_nodes: Callable[[], list[str]]) -> None:
+        from composition_interfaces.srv import ListNodes, LoadNode, UnloadNode
+
+        self._list_nodes = list_nodes
+        self._refusal = _REFUSAL.format(system)
+        self._numbers = itertools.count(1)
+        self._ids: dict[str, int] = {}
+        self.node = RosNode(
+            container_name(system),
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter('start_type_description_service', value=False)],
+        )
+        for kind, name, answer in (
+            (LoadNode, 'load_node', self._refuse),
+            (UnloadNode, 'unload_node', self._refuse),
+            (ListNodes, 'list_nodes', self._list),
+        ):
+            self.node.create_service(kind, f'~/_container/{name}', answer)
+
+    def _refuse(self, _request: Any, response: Any) -> Any:
+        response.success, response.error_message = False, self._refusal
+        return response
+
+    def _list(self, _request: Any, response: Any) -> Any:
+        names = self._list_nodes()
+        for name in names:
+            if name not in self._ids:
+                self._ids[name] = next(self._numbers)
+        response.full_node_names = names
+        response.unique_ids = [self._ids[name] for name in names]
+        return response

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from composer.errors import ComposerError, StartError
-from composer.runtime.entities.absent_ends import AbsentEnd
 from composer.runtime.entities.parameters import NodeParameters
 from composer.runtime.entities.publishers import Publisher
 from composer.runtime.entities.service_clients import ServiceClient
@@ -21,6 +20,7 @@ from composer.runtime.entities.timers import Timer
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from composer.language.specs import PublisherSpec, SubscriptionSpec
     from composer.runtime.nodes.live_entity import LiveEntity
     from composer.runtime.nodes.live_node import LiveNode
 
@@ -118,3 +118,37 @@ def _failing_for(node: LiveNode) -> Iterator[None]:
         # rclpy and the middleware raise many kinds; none of them may leave half a system.
         message = f"node '{node.spec.key}': {type(error).__name__}: {error}"
         raise StartError(message) from error
+
+
+class AbsentEnd:
+    """A publisher or subscription that is not on the graph as far as Composer makes it.
+
+    One that is not active comes when a behaviour wants it; others are made by a library.
+    """
+
+    def __init__(self, _node: object, spec: PublisherSpec | SubscriptionSpec) -> None:
+        self._spec = spec
+
+    def publish(self, _payload: Any, _unheld: int = 0) -> None:
+        """Drop what is published.
+
+        Raises:
+            ComposerError: A library publishes there.
+        """
+        if self._spec.made_by:
+            message = f"publisher '{self._spec.name}' is made by a library, which publishes on it"
+            raise ComposerError(message)
+
+    def delivery(self) -> tuple[str, str, int]:
+        """Return that no messages go any way."""
+        return '', '', 0
+
+    def rest(self, *, rests: bool) -> None:
+        """Do nothing: nothing is published."""
+
+    def change(self, spec: PublisherSpec | SubscriptionSpec) -> None:
+        """See `LiveEntity`."""
+        self._spec = spec
+
+    def destroy(self) -> None:
+        """See `LiveEntity`."""

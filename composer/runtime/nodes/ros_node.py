@@ -37,6 +37,8 @@ import threading
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
+from rclpy.impl import rcutils_logger
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
@@ -45,13 +47,14 @@ from composer.ament import remaps_actions
 from composer.names import expand_name
 from composer.runtime.logs import has_rosout_publisher
 from composer.runtime.middleware.lost_participants import LostParticipants
-from composer.runtime.nodes.node_logger import NodeLogger
+from composer.terminal import escape_log
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent, SetParametersResult
     from rclpy.context import Context
+    from rclpy.impl.logging_severity import LoggingSeverity
     from rclpy.publisher import Publisher
 
     from composer.language.specs import NodeSpec
@@ -61,6 +64,8 @@ _PARAMETER_EVENTS = '/parameter_events'
 _TYPE_DESCRIPTION = 'start_type_description_service'
 _SIM_TIME = 'use_sim_time'
 _POLL_SEC = 0.001
+# rclpy leaves out the files in this list when it looks for the line of code that logs.
+rcutils_logger._internal_callers.append(__file__)  # noqa: SLF001
 
 
 class ComposedRosNode(Node):
@@ -291,3 +296,34 @@ def _as_overrides(entries: Mapping[str, ParameterEntry]) -> list[Parameter]:
         # An empty list has no type.
         if entry.type is not None
     ]
+
+
+class NodeLogger(RcutilsLogger):
+    """A logger that takes any level and options from any line of code.
+
+    rclpy keeps what a line has logged first, and refuses another level or other options from it:
+    `log = logger.info if ok else logger.warning`. So each level with its options has a logger of
+    rclpy's. What a behaviour logs may be what others have sent: it can forge no line, and no
+    terminal obeys more of it than its colours.
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._alike: dict[object, RcutilsLogger] = {}
+
+    def log(self, message: str, severity: LoggingSeverity, **options: object) -> bool:
+        """See the base class."""
+        key = severity, *sorted((name, repr(value)) for name, value in options.items())
+        logger = self._alike.get(key)
+        if logger is None:
+            logger = self._alike.setdefault(key, RcutilsLogger(self.name))
+        text = escape_log(message) if isinstance(message, str) else message
+        return bool(logger.log(text, severity, **options))
+
+    def get_child(self, name: str) -> NodeLogger:
+        """See the base class."""
+        child = super().get_child(name)
+        logger = NodeLogger(child.name)
+        logger.logger_sublogger_namepair = child.logger_sublogger_namepair
+        child.logger_sublogger_namepair = None  # Its finalizer would take it away.
+        return logger

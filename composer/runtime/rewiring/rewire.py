@@ -11,34 +11,41 @@ from itertools import chain
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
+from composer.checks.connections import topology
 from composer.entity_kinds import ENTITY_KINDS
 from composer.errors import StartError
 from composer.planning.plan import COMING, GOING, Action
 from composer.processes.external_process import ExternalProcess
 from composer.runtime.entities.creators import create_entity
+from composer.runtime.logs import system_logger
 from composer.runtime.nodes.system_handle import never
-from composer.runtime.rewiring.clashes import find_clashing_ends
-from composer.runtime.rewiring.goals_in_flight import find_going_actions, wait_for_goals
 from composer.runtime.rewiring.node_changes import NodeChange, set_sim_times
 from composer.runtime.rewiring.order_of_ends import order_ends
 from composer.runtime.rewiring.transaction import Transaction
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
-    from composer.language.specs import ComponentSpec, ProcessSpec
+    from composer.entity_kinds import ChannelKind
+    from composer.language.specs import ComponentSpec, ProcessSpec, SystemSpec
     from composer.planning.plan import Plan, Target
     from composer.processes.supervisor import ProcessSupervisor
+    from composer.runtime.entities.actions import ActionServer
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import SystemHandle
     from composer.runtime.restart import NodeRestarter
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.start import Starter
+    from composer.runtime.stop_request import StopRequest
+
+    # An end, the kind and full name of what it is an end of, and its type.
+    _End = tuple[Target, tuple[ChannelKind, str], str]
 
 # All others are of a moment, or final.
 _STATES = ('unconfigured', 'inactive', 'active')
 _SETTLE_SEC = 0.05
 _SETTLE_POLL_SEC = 0.0005
+_POLL_SEC = 0.02
 
 
 class Rewiring:
@@ -351,3 +358,77 @@ def _create_again(node: LiveNode, section: str, spec: Any) -> None:
 def _is_in_a_call(node: LiveNode) -> bool:
     """Return whether a behaviour of a node runs that ends soon: no goal, and no coroutine."""
     return any(call.thread is not None and call.progress is None for call in node.running.calls())
+
+
+def find_clashing_ends(old: SystemSpec, new: SystemSpec) -> set[Target]:
+    """Return the ends, of `old` and of `new`, of what has another type in the other system.
+
+    A process of Fast DDS has one type for each name: an end with the new one can be created only
+    when all with the old one are gone.
+    """
+    before, after = list(_ends(old)), list(_ends(new))
+
+    def differing(ends: list[_End], others: list[_End]) -> set[Target]:
+        types = {channel: type_name for _, channel, type_name in others}
+        return {
+            target
+            for target, channel, type_name in ends
+            if types.get(channel, type_name) != type_name
+        }
+
+    return differing(before, after) | differing(after, before)
+
+
+def _ends(spec: SystemSpec) -> Iterator[_End]:
+    for node in spec.nodes.values():
+        for kind, end in node.ends():
+            if kind.channel is not None:
+                channel = (
+                    kind.channel,
+                    topology.full_name(node, kind.channel, getattr(end, kind.channel)),
+                )
+                yield (node.full_name, kind.section, end.name), channel, end.type
+
+
+def find_going_actions(nodes: Mapping[str, LiveNode], plan: Plan) -> Iterator[ActionServer]:
+    """Yield the actions that go, alone or with their nodes."""
+    for operation in plan.operations:
+        full_name, section, name = operation.target
+        node = nodes.get(full_name)
+        if node is None or operation.action not in GOING or section not in ('nodes', 'actions'):
+            continue
+        actions: dict[str, Any] = node.entities['actions']
+        yield from actions.values() if section == 'nodes' else [actions[name]]
+
+
+def wait_for_goals(
+    servers: Collection[ActionServer],
+    stop: StopRequest,
+    aborts: Callable[[], bool],
+    is_outdated: Callable[[], bool],
+) -> None:
+    """Let actions accept no more goals, and wait until none is in flight, or for a stop.
+
+    Args:
+        aborts: Returns whether the goals are aborted; asked again and again.
+        is_outdated: Returns whether there is a newer edit; asked again and again.
+
+    Raises:
+        StartError: There is; the actions accept goals again.
+    """
+    for server in servers:
+        server.retire(is_retired=True)
+    was_told = False
+    while any(each.has_goals for each in servers) and not stop.is_set:
+        if is_outdated():
+            for server in servers:
+                server.retire(is_retired=False)
+            message = 'the files have changed while goals were waited for'
+            raise StartError(message)
+        if aborts():
+            for server in servers:
+                server.retire(is_retired=True, aborts=True)
+        elif not was_told:
+            was_told = True
+            system_logger.info('reload: waiting for the goals in flight of actions that go…')
+        sleep(_POLL_SEC)

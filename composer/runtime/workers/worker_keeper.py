@@ -6,14 +6,20 @@ import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
+from composer.checks.connections.topology import full_name
 from composer.errors import ComposerError, ExitCode
 from composer.processes.worker_supervisor import WorkerSupervisor
-from composer.runtime.workers.losses import describe_losses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from composer.language.specs import SystemSpec
+    from composer.language.specs import (
+        DeclaredEndSpec,
+        DeclaredNodeSpec,
+        EndSpec,
+        NodeSpec,
+        SystemSpec,
+    )
     from composer.processes.external_process import ExternalProcess
     from composer.runtime.workers.worker import Worker
     from composer.terminal import EscapingLogger
@@ -22,6 +28,13 @@ if TYPE_CHECKING:
 _RESTART_SEC = 10.0
 # How long what does not stop gets to end.
 KILL_SEC = 0.5
+# The sections whose ends give something, those that take it, and what these do without it.
+_GIVEN = {
+    'publishers': ('subscriptions', 'gets nothing on'),
+    'services': ('service_clients', 'has nobody to call at'),
+    'actions': ('action_clients', 'has nobody to send goals to at'),
+}
+_MOST = 5
 
 
 class _LazyLogger:
@@ -122,3 +135,53 @@ class WorkerKeeper:
         if worker is not None and worker.spec.required and self.spec is not None:
             self.log.error(f"worker '{worker.name}' is required: the system ends")
             self._end_system(ExitCode.FAILED if code else ExitCode.DONE)
+
+
+def describe_losses(spec: SystemSpec, worker: str) -> str:
+    """Return in words which nodes go with a worker, and what the others do not have then."""
+    gone, left = _split(spec, worker)
+    names = {node.full_name for node in gone}
+    nodes = 'its node is' if len(names) == 1 else f'its {len(names)} nodes are'
+    text = f'{nodes} gone: {_list(sorted(names))}'
+    lines = list(_describe_ends(gone, left))
+    return '\n'.join([text, *(f'  {line}' for line in lines)])
+
+
+def _split(
+    spec: SystemSpec, worker: str
+) -> tuple[list[NodeSpec], list[NodeSpec | DeclaredNodeSpec]]:
+    """Return the nodes of a worker, and all others."""
+    gone = [node for node in spec.nodes.values() if node.worker == worker]
+    names = {node.full_name for node in gone}
+    return gone, [node for node in spec.end_owners() if node.full_name not in names]
+
+
+def _describe_ends(
+    gone: Collection[NodeSpec], left: Collection[NodeSpec | DeclaredNodeSpec]
+) -> Iterator[str]:
+    for giving, (taking, lack) in _GIVEN.items():
+        lost = _channels(gone, giving) - _channels(left, giving)
+        for node in left:
+            missed = sorted(_channels([node], taking) & lost)
+            if missed:
+                yield f"'{node.full_name}' {lack} {_list(missed)}"
+
+
+def _channels(nodes: Collection[NodeSpec | DeclaredNodeSpec], section: str) -> set[str]:
+    return {
+        full_name(node, kind.channel, _channel_of(end, kind.channel))
+        for node in nodes
+        for kind, end in node.ends()
+        if kind.section == section and kind.channel is not None
+    }
+
+
+def _channel_of(end: EndSpec | DeclaredEndSpec, channel: str) -> str:
+    """Return the name of the topic, service or action of an end, as written."""
+    return str(getattr(end, 'channel', None) or getattr(end, channel))
+
+
+def _list(names: list[str]) -> str:
+    shown = ', '.join(f"'{each}'" for each in names[:_MOST])
+    rest = len(names) - _MOST
+    return f'{shown} and {rest} more' if rest > 0 else shown

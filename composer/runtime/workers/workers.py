@@ -32,12 +32,6 @@ from composer.runtime.workers.system_calls import SystemCalls
 from composer.runtime.workers.worker import Worker
 from composer.runtime.workers.worker_edits import ChangedWorker, ReplacedWorker
 from composer.runtime.workers.worker_keeper import KILL_SEC, WorkerKeeper
-from composer.runtime.workers.worker_parts import (
-    find_moved,
-    needs_new_process,
-    part_of,
-    used_workers,
-)
 from composer.runtime.workers.worker_watch import WorkerWatch
 
 if TYPE_CHECKING:
@@ -45,7 +39,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.language.bindings import Binding
-    from composer.language.specs import SystemSpec
+    from composer.language.specs import SystemSpec, WorkerSpec
     from composer.planning.snapshot import Snapshot
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.workers.system_calls import SystemOfWorkers
@@ -398,3 +392,38 @@ def _process_threads(spec: SystemSpec) -> int:
 def no_workers() -> Workers:
     """Return the workers of a system whose nodes all run in one process."""
     return Workers(are_used=False)
+
+
+def used_workers(spec: SystemSpec) -> list[str]:
+    """Return the names of the workers that nodes are in."""
+    return list(dict.fromkeys(each.worker for each in spec.nodes.values() if each.worker))
+
+
+def find_moved(old: SystemSpec, new: SystemSpec) -> list[str]:
+    """Return the full names of the nodes that have another process in `new`."""
+    before = {each.full_name: each.worker for each in old.nodes.values()}
+    return [
+        each.full_name
+        for each in new.nodes.values()
+        if before.get(each.full_name, each.worker) != each.worker
+    ]
+
+
+def needs_new_process(old: WorkerSpec, new: WorkerSpec) -> bool:
+    """Return whether a process cannot become what a worker says now."""
+    return old.environment != new.environment or (new.nice or 0) < (old.nice or 0)
+
+
+def part_of(snapshot: Snapshot, name: str) -> Snapshot:
+    """Return what the process of a worker is compared by; `''` is that of the system."""
+    spec = snapshot.spec.in_worker(name)
+    if not name:
+        return replace(snapshot, spec=spec)
+    if level := spec.workers[name].log_level:
+        nodes = {
+            key: node if node.log_level else replace(node, log_level=level)
+            for key, node in spec.nodes.items()
+        }
+        spec = replace(spec, nodes=nodes)
+    # What is left out is what the whole system is compared by.
+    return replace(snapshot, spec=spec, sources={}, definitions={})

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from composer.scenarios.expectations.happenings import sort_events
-from composer.scenarios.expectations.like_expectations import check_like
 from composer.scenarios.expectations.log_expectations import (
     check_error,
     check_exit,
@@ -16,6 +15,7 @@ from composer.scenarios.expectations.log_expectations import (
 from composer.scenarios.expectations.node_expectations import check_parameters, check_state
 from composer.scenarios.expectations.step_expectations import check_outcome, check_undone
 from composer.scenarios.expectations.topic_expectations import (
+    check_like,
     check_messages,
     check_order,
     check_rate,

@@ -1,16 +1,21 @@
-"""Expectations on the messages of topics: how many, how often, in which order."""
+"""Expectations on the messages of topics: how many, how often, in which order, and which."""
 
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import pairwise
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from itertools import islice, pairwise
+from typing import TYPE_CHECKING, Any
 
+from composer.errors import ComposerError
+from composer.expressions.evaluation import evaluate_expression
+from composer.expressions.limits import Budget
+from composer.expressions.sandbox import Sandbox
 from composer.scenarios.expectations.diffs import render_differences, show_value
 from composer.scenarios.expectations.failures import Failure
 from composer.scenarios.expectations.matching import Comparison, find_distance
-from composer.scenarios.expectations.message_conditions import ConditionError, condition_of
 from composer.scenarios.expectations.wording import at_time, count_of, expected_count, in_window
+from composer.scenarios.fields import MessageView, explain_error
 from composer.scenarios.specs import WindowSpec
 from composer.scenarios.times import NANOSECONDS, to_fraction
 
@@ -20,6 +25,7 @@ if TYPE_CHECKING:
     from composer.scenarios.expectations.happenings import Happenings, PublishedMessage
     from composer.scenarios.expectations.matching import Difference
     from composer.scenarios.specs import (
+        LikeExpectationSpec,
         MessageExpectationSpec,
         OrderExpectationSpec,
         PatternSpec,
@@ -28,6 +34,10 @@ if TYPE_CHECKING:
 
 # Of more messages, the nearest is searched for among the last.
 _MOST_COMPARED = 200
+# The name of the whole message in a condition.
+MESSAGE = 'message'
+# The first messages that differ are shown.
+_MOST_SHOWN = 3
 
 
 class _Unevaluated(Exception):  # noqa: N818 - caught in this module
@@ -236,3 +246,104 @@ def _what(pattern: PatternSpec) -> str:
 
 def _failure(pattern: PatternSpec, message: str, time_ns: int | None, diff: str = '') -> Failure:
     return Failure(pattern.path, message, diff, time_ns, (pattern.topic,))
+
+
+class _NoBudget(Budget):
+    """Counts no work: a case has thousands of messages, and runs behaviours of the same author."""
+
+    def spend(self, *_values: Any) -> None:
+        pass
+
+    def spend_on_parsing(self, code: str) -> None:
+        pass
+
+    def collect(self, items: Iterable[Any]) -> list[Any]:
+        return list(items)
+
+
+class ConditionError(ComposerError):
+    """A condition cannot be evaluated for a message."""
+
+
+class Condition:
+    """An expression over the fields of a message, and the message as `message`."""
+
+    def __init__(self, code: str) -> None:
+        self.code = code
+        self._sandbox = Sandbox()
+        self._sandbox.budget = _NoBudget()
+        self._names: frozenset[str] | None = None
+
+    def holds(self, message: Any) -> bool:
+        """Return whether the condition holds for a message.
+
+        Raises:
+            ConditionError: The expression is wrong, or the message lacks what it asks for, as an
+                item of an array that is too short.
+        """
+        try:
+            if self._names is None:
+                self._names = self._sandbox.names_in(self.code)
+            view = MessageView(message)
+            fields = message.get_fields_and_field_types()
+            # A field that is called so, too, hides the message, as in the checks.
+            scope: dict[str, Any] = {MESSAGE: view}
+            scope |= {name: getattr(view, name) for name in self._names if name in fields}
+            return bool(evaluate_expression(self._sandbox, self.code, scope))
+        except Exception as error:
+            raise ConditionError(explain_error(error)) from error
+
+
+@lru_cache(maxsize=256)
+def condition_of(code: str) -> Condition:
+    """Return the condition of an expression; each is parsed once."""
+    return Condition(code)
+
+
+def check_like(expected: LikeExpectationSpec, happened: Happenings) -> Iterator[Failure]:
+    """Check that a topic has the messages that were recorded, in their order."""
+    # Most cases compare nothing with a recording.
+    from composer.recordings.reading import read_recording
+    from composer.recordings.recorded_topics import RecordingError
+
+    at = (*expected.path, 'like')
+    try:
+        recording = read_recording(expected.recording)
+        recorded = [each for _, _, each in recording.messages([expected.topic])]
+    except RecordingError as error:
+        yield Failure(at, str(error))
+        return
+    if not any(each.name == expected.topic for each in recording.topics):
+        yield Failure(at, f'{expected.recording} has no messages of {expected.topic}')
+        return
+    yield from compare_messages(expected, recorded, happened)
+
+
+def compare_messages(
+    expected: LikeExpectationSpec, recorded: list[Any], happened: Happenings
+) -> Iterator[Failure]:
+    """Compare the messages of a topic with those that were recorded."""
+    found = list(happened.of_topic(expected.topic, WindowSpec()))
+    ignored = frozenset(tuple(each.split('.')) for each in expected.ignored)
+    comparison = Comparison(expected.tolerance, ignored)
+    pairs = enumerate(zip(recorded, found, strict=False), start=1)
+    differing = (
+        (number, each, differences)
+        for number, (wanted, each) in pairs
+        if (differences := list(comparison.find_differences(wanted, each.message)))
+    )
+    names = (expected.topic,)
+    at = (*expected.path, 'like')
+    for number, each, differences in islice(differing, _MOST_SHOWN):
+        message = f'message {number} on {expected.topic}{at_time(each.time_ns)} is not as recorded'
+        yield Failure(at, message, render_differences(differences), each.time_ns, names)
+    if len(recorded) != len(found):
+        message = (
+            f'{expected.topic} has {count_of(len(found), "message")}, '
+            f'and {count_of(len(recorded), "message")} in the recording'
+        )
+        is_longer = len(found) > len(recorded)
+        time = found[len(recorded)].time_ns if is_longer else happened.end_ns
+        odd = found[len(recorded)].message if is_longer else recorded[len(found)]
+        diff = f'{"+" if is_longer else "-"} {show_value(odd)}'
+        yield Failure(at, message, diff, time, names)

@@ -6,10 +6,13 @@ import json
 import os
 import tempfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from composer.checks.checker import create_context
 from composer.errors import ComposerError, ExitCode, StartError
+from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.parsing.parameter_references import with_values
 from composer.language.specs import ParameterFileSpec
 from composer.language.values.parameter_values import StartingValues
@@ -21,15 +24,9 @@ from composer.scenarios.expectations.evaluation import evaluate
 from composer.scenarios.expectations.log_expectations import START, expects_refusal
 from composer.scenarios.running.case_results import CaseFailure, CaseResult
 from composer.scenarios.running.case_steps import CaseSteps
-from composer.scenarios.running.failure_reports import (
-    describe_error,
-    describe_failure,
-    list_log,
-)
-from composer.scenarios.running.recording_input import RecordingInput
-from composer.scenarios.running.source_input import SourceInput
+from composer.scenarios.running.failure_reports import describe_error, describe_failure, list_log
 from composer.scenarios.running.stand_in_servers import StandIns, is_of_stand_in
-from composer.scenarios.specs import ParametersExpectationSpec
+from composer.scenarios.specs import ParametersExpectationSpec, find_sources
 from composer.scenarios.times import NANOSECONDS
 from composer.simulation.events import Event
 from composer.simulation.simulated_system import SimulatedSystem
@@ -37,15 +34,15 @@ from composer.simulation.trace import render_event
 from composer.virtual_time.clocks import MONOTONIC_START_NS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from composer.language.loaded_system import LoadedSystem
-    from composer.language.specs import NodeSpec
+    from composer.language.specs import NodeSpec, SystemSpec
+    from composer.recordings.reading import Recording
     from composer.scenarios.running.case_results import CaseRequest
     from composer.scenarios.scenario_files import LoadedScenarios
-    from composer.scenarios.specs import CaseSpec, ValuesByNode
+    from composer.scenarios.specs import CaseSpec, GivenSpec, ValuesByNode
     from composer.virtual_time.unrepeatable import Notice
-
 
 # A behaviour may use so much of the limit of its case before it counts as stuck: the rest is for
 # telling so, with the events before.
@@ -218,3 +215,102 @@ def _write_trace(path: str, simulated: SimulatedSystem) -> None:
 
 def _describe_notice(notice: Notice) -> str:
     return f'{notice.file}:{notice.line}: {notice.what}'
+
+
+class RecordingInput:
+    """Publishes what a recording has, one message after the other, each decoded in its turn.
+
+    Args:
+        recording: Its first message is published at the start of the system.
+    """
+
+    def __init__(
+        self, simulated: SimulatedSystem, recording: Recording, system: LoadedSystem
+    ) -> None:
+        self._simulated = simulated
+        self._start_ns = recording.start_ns
+        self._types = {topic.name: topic.type for topic in recording.topics}
+        self._messages = recording.messages(list_external_topics(system))
+
+    def schedule(self) -> None:
+        """Ask for the next message at its time."""
+        message = next(self._messages, None)
+        if message is not None:
+            seconds = (message[0] - self._start_ns) / NANOSECONDS
+            self._simulated.at(seconds, lambda: self._publish(*message[1:]))
+
+    def _publish(self, topic: str, message: Any) -> None:
+        self.schedule()
+        self._simulated.publish(topic, message, self._types[topic])
+
+
+def list_external_topics(system: LoadedSystem) -> set[str]:
+    """Return the full names of the topics that nodes hear and none of them publishes.
+
+    What external processes publish counts as external: they do not run.
+    """
+    context = create_context(system, InterfaceCatalogue())
+    if context is None:
+        return set()
+    topology = context.topology
+    created = {name for kind, name, provides in topology.created if kind == 'topic' and provides}
+    return {
+        channel.name
+        for channel in topology.of_kind('topic')
+        if any(not end.is_declared for end in channel.users)
+        and all(end.is_declared for end in channel.providers)
+    } - created
+
+
+class SourceInput:
+    """Lets sources bring what a case gives them.
+
+    Attributes:
+        played: The full names of the nodes, and the names of the sources.
+        start_ns: When the first of the recordings begins; `None` without one.
+    """
+
+    def __init__(self, given: GivenSpec, system: SystemSpec | None) -> None:
+        nodes = system.nodes.values() if system else ()
+        self._inputs = [
+            (source, node.full_name, name)
+            for source in given.sources
+            for node, name in find_sources(nodes, source.name)[:1]
+        ]
+        self.played = frozenset((node, name) for _, node, name in self._inputs)
+        self._recordings = {
+            source.path: read_recording(source.recording)
+            for source, *_ in self._inputs
+            if source.recording is not None
+        }
+        starts = [each.start_ns for each in self._recordings.values()]
+        self.start_ns = min(starts, default=None)
+
+    def schedule(self, simulated: SimulatedSystem, until_ns: int) -> None:
+        """Ask for each value at its time."""
+        for source, node, name in self._inputs:
+            if recording := self._recordings.get(source.path):
+                simulated.at(0, partial(self._play, simulated, recording, node, name))
+            for value in source.values:
+                for time_ns in value.schedule.list_times(until_ns):
+                    bring = partial(simulated.bring, node, name, value.value)
+                    simulated.at(time_ns / NANOSECONDS, bring)
+
+    def _play(
+        self, simulated: SimulatedSystem, recording: Recording, node: str, name: str
+    ) -> None:
+        topic = simulated.topic_of_source(node, name)
+        self._play_next(simulated, recording.messages({topic}), node, name)
+
+    def _play_next(
+        self, simulated: SimulatedSystem, messages: Iterator[Any], node: str, name: str
+    ) -> None:
+        message = next(messages, None)
+        if message is None or self.start_ns is None:
+            return
+
+        def bring() -> None:
+            self._play_next(simulated, messages, node, name)
+            simulated.bring(node, name, message[2])
+
+        simulated.at((message[0] - self.start_ns) / NANOSECONDS, bring)

@@ -4,8 +4,8 @@ import pytest
 
 from composer.scenarios.expectations.evaluation import evaluate
 from composer.scenarios.parsing.expectation_parser import parse_expectation
+from composer.scenarios.parsing.file_parser import parse_step
 from composer.scenarios.parsing.full_names import NameReader
-from composer.scenarios.parsing.step_parser import parse_step
 from composer.scenarios.specs import CaseSpec, GivenSpec
 from composer.scenarios.times import to_nanoseconds
 from composer.simulation.events import Event

@@ -4,7 +4,7 @@ import pytest
 
 from composer.scenarios.expectations.evaluation import evaluate
 from composer.scenarios.expectations.happenings import sort_events
-from composer.scenarios.expectations.like_expectations import compare_messages
+from composer.scenarios.expectations.topic_expectations import compare_messages
 from composer.scenarios.outcomes import Outcome
 from tests.scenarios.expectations.conftest import at, case_of, step_of
 from tests.scenarios.expectations.plain_messages import number, scan
