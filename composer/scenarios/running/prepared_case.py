@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.declared_packages import load_declared, provide_declared
 from composer.language.pipeline import load_system
 from composer.language.values.start_reader import StartValueReader
 from composer.records import record
@@ -49,7 +51,9 @@ class PreparedFile:
 
 
 def prepare_file(name: str) -> PreparedFile:
-    """Read a scenario file and its system, and load the interfaces that it uses.
+    """Read a scenario file and its system, and load or build the interfaces that it uses.
+
+    To build them may take longer than a case may.
 
     Raises:
         ComposerError: The file cannot be read.
@@ -60,10 +64,13 @@ def prepare_file(name: str) -> PreparedFile:
     if system is not None and system.spec is not None:
         types = (end.type for node in system.spec.end_owners() for _, end in node.ends())
         for module in {'.'.join(each.split('/')[:2]) for each in types}:
-            # Packages that the file declares are built by the case.
+            # Packages that the file declares are imported by the case.
             with suppress(ImportError):
                 importlib.import_module(module)
         load_type_supports()
+        # What cannot be built, the case tells.
+        with suppress(ComposerError):
+            provide_declared(load_declared(system, InterfaceCatalogue()), lambda _line: None)
     return PreparedFile(loaded)
 
 
