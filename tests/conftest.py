@@ -103,13 +103,13 @@ def shared_cache(tmp_path_factory):
 @pytest.fixture(scope='session')
 def built_interfaces(shared_cache):
     """Return a cache folder that has the packages of the shipped systems."""
-    for name in ('self_contained', 'fibonacci_client'):
-        subprocess.run(
-            [sys.executable, '-m', 'composer', 'interfaces', 'build', f'configs/{name}.yaml'],
-            cwd=ROOT,
-            env=os.environ | {'XDG_CACHE_HOME': str(shared_cache)},
-            check=True,
-        )
+    files = [f'configs/{name}.yaml' for name in ('self_contained', 'fibonacci_client', 'cell')]
+    subprocess.run(
+        [sys.executable, '-m', 'composer', 'interfaces', 'build', *files],
+        cwd=ROOT,
+        env=os.environ | {'XDG_CACHE_HOME': str(shared_cache)},
+        check=True,
+    )
     return shared_cache
 
 

@@ -233,10 +233,8 @@ def test_the_patrol_drives_a_program_whose_description_a_command_prints(
     assert child.stop() == 0
 
 
-def test_the_cell_loads_components_and_brings_one_to_active(
-    up, peer, wait_for, python3, monkeypatch, shared_cache
-):
-    monkeypatch.setenv('XDG_CACHE_HOME', str(shared_cache))
+@pytest.mark.usefixtures('python3', 'interface_cache')
+def test_the_cell_loads_components_and_brings_one_to_active(up, peer, wait_for):
     judged = peer.listen(Bool, '/cell_1/too_hot')
     child = up('cell')
     wait_for(lambda: judged, 'a judgement')

@@ -102,8 +102,7 @@ class Members:
 
 
 @pytest.fixture
-def members(compose, shared_cache, monkeypatch):
-    monkeypatch.setenv('XDG_CACHE_HOME', str(shared_cache))
+def members(compose, interface_cache):
     running = Members(compose)
     yield running
     running.manager.close()
