@@ -253,9 +253,9 @@ function remember() {
   history.replaceState(null, '', hash ? `#${hash}` : location.pathname);
 }
 
-// Returns the id of what is selected in the address, and sets the rest of the view from it.
-function restore() {
-  const [id, ...rest] = location.hash.slice(1).split('&');
+// Returns the id of what is selected in an address, and sets the rest of the view from it.
+function restore({hash} = location) {
+  const [id, ...rest] = hash.slice(1).split('&');
   const view = new URLSearchParams(rest.join('&'));
   folded.clear();
   for (const each of view.getAll('fold')) folded.add(each);
@@ -930,8 +930,9 @@ function take(next) {
 }
 
 window.addEventListener('resize', () => (showsAll ? fit() : show(shaped(view))));
-window.addEventListener('hashchange', async () => {
-  await draw(restore());
+window.addEventListener('hashchange', async (event) => {
+  // By now, a drawing that came may have put into the address what was selected before.
+  await draw(restore(new URL(event.newURL)));
   if (chosen !== null) bringIn(shapeOf(chosen));
 });
 setInterval(showAges, 500);
