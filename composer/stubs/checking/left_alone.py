@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import itertools
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 from composer.python_source.syntax import FUNCTIONS, words_in
@@ -101,12 +101,7 @@ class ReportedPlace:
         chain, function = self.around, self.function
         if not chain or any(itertools.starmap(_is_guarded, itertools.pairwise(chain))):
             return True
-        asked = {
-            name
-            for node in (ast.walk(function) if function else ())
-            if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in _TESTS
-            for name in words_in(*node.args)
-        }
+        asked = _asked_in(function) if function else frozenset()
         inner = next((i for i, node in enumerate(chain) if isinstance(node, ast.stmt)), 0)
         part = chain[max(0, inner - 1)] if hasattr(chain[inner], 'body') else chain[inner]
         names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
@@ -127,9 +122,26 @@ class ReportedPlace:
             self.copy.start(node)[0] <= self.report.line
             and (any(map(_is_of_file, tests)) or extra & words_in(*tests))
             and (inside & {*map(id, tests)} or (id(node) not in around and _may_end(node)))
-            for node in ast.walk(function)
-            if (tests := _tests_of(node))
+            for node, tests in _branches_in(function)
         )
+
+
+# Reports come a function after the other.
+@lru_cache(maxsize=1)
+def _asked_in(function: FunctionNode) -> frozenset[str]:
+    """Return the names in what a function asks of values: what they are, or have."""
+    return frozenset(
+        name
+        for node in ast.walk(function)
+        if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in _TESTS
+        for name in words_in(*node.args)
+    )
+
+
+@lru_cache(maxsize=1)
+def _branches_in(function: FunctionNode) -> list[tuple[ast.AST, list[ast.expr]]]:
+    """Return the branches in a function, each with its conditions."""
+    return [(node, tests) for node in ast.walk(function) if (tests := _tests_of(node))]
 
 
 def _tests_of(node: ast.AST) -> list[ast.expr]:
