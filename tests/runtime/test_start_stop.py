@@ -352,7 +352,7 @@ def test_a_signal_while_on_start_runs_ends_the_start(compose):
     child = compose(text, CODE)
     child.wait_for_line('hanging')
 
-    assert child.stop() == 1
+    assert child.stop(once_up=False) == 1
     child.wait_for_line("node 'stuck': on_start did not end in time; it is at")
     assert not child.matching('nodes ready')
     assert not child.matching('starting')
