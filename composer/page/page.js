@@ -200,6 +200,8 @@ function replace(list, items) {
 // Selection, by pointer, keyboard, list or address.
 const shapeOf = (token) => document.getElementById(standsIn[token] ?? token);
 let chosen = null;
+// The id of what a new address asks for, until it is drawn.
+let wished;
 
 // Gives a class to what is drawn for these parts, and to nothing else.
 function paint(name, tokens) {
@@ -424,7 +426,8 @@ let asked = 0;
 async function draw(wanted) {
   const turn = ++asked;
   const before = chosen;
-  let selected = wanted ?? parts.get(chosen)?.id ?? restore();
+  wished = wanted ?? wished;
+  let selected = wished ?? parts.get(chosen)?.id ?? restore();
   const words = [...folded].map((id) => `folded=${encodeURIComponent(id)}`).join('&');
   const drawing = await get(`api/drawing?${words}`);
   // Who folds two boxes in a row sees the second drawing.
@@ -460,7 +463,10 @@ async function draw(wanted) {
   find();
   showTree();
   // Until there is a drawing, the address keeps what is wanted.
-  if (parts.size) choose(tokens.get(selected), false);
+  if (parts.size) {
+    wished = undefined;
+    choose(tokens.get(selected), false);
+  }
   if (hasFocus) shapeOf(chosen)?.focus();
   mark();
   stampParts();
