@@ -35,7 +35,8 @@ EDITS = {
 WAYS = {
     'handed over': ('deeper', 'options', 'best effort'),
     'sent': ('best effort', 'two at once'),
-    'heard outside': ('reentrant', 'always sent'),
+    # Of a group that is reentrant, messages are heard in any order, also by what comes after it.
+    'heard outside': ('always sent', 'reentrant'),
     'sent first': ('two at once', 'group'),
 }
 
