@@ -74,7 +74,10 @@ def failure(call):
 
 def play(node):
     callers[:] = [node, threading.get_ident()]
-    for _ in range(5):
+    deadline = time.monotonic() + 20
+    while not ways or (LIMIT is None and 'here' not in ways and time.monotonic() < deadline):
+        # Where the server's group is busy for a moment, it is handed over.
+        time.sleep(0.01)
         response = node.call('echo', {'float32_value': 0.1, 'string_value': 'x'}, LIMIT)
     tell(node, 'values', response.float32_value, response.string_value)
     keep_apart(node)
@@ -227,6 +230,6 @@ def test_calls_and_goals_are_the_same_handed_over_or_sent(compose, peer):
 
     unlimited, ways = play(compose, peer, local='true', limit=None)
     assert unlimited == sent
-    # Where the server's group is busy for a moment, it is handed over; then one is of a coroutine.
-    assert 'here' in ways[:5]
-    assert ways[5:7] == ['handed', 'sent']
+    # After it, one is of a coroutine.
+    first = ways.index('here') + 1
+    assert ways[first : first + 2] == ['handed', 'sent']
