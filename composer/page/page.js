@@ -200,7 +200,7 @@ function replace(list, items) {
 // Selection, by pointer, keyboard, list or address.
 const shapeOf = (token) => document.getElementById(standsIn[token] ?? token);
 let chosen = null;
-// The id of what a new address asks for, until it is drawn.
+// The id of what a new address asks for, until it or something else is selected.
 let wished;
 
 // Gives a class to what is drawn for these parts, and to nothing else.
@@ -270,6 +270,7 @@ function restore({hash} = location) {
 function fold(part) {
   if (!folded.delete(part.id)) folded.add(part.id);
   chosen = tokens.get(part.id) ?? chosen;
+  wished = undefined;
   return draw();
 }
 
@@ -289,6 +290,7 @@ function press(token) {
 
 function choose(token, mustBeSeen) {
   chosen = parts.has(token) ? token : null;
+  wished = undefined;
   remember();
   const hadFocus = byId('details').contains(document.activeElement);
   describe(chosen);
@@ -463,10 +465,7 @@ async function draw(wanted) {
   find();
   showTree();
   // Until there is a drawing, the address keeps what is wanted.
-  if (parts.size) {
-    wished = undefined;
-    choose(tokens.get(selected), false);
-  }
+  if (parts.size) choose(tokens.get(selected), false);
   if (hasFocus) shapeOf(chosen)?.focus();
   mark();
   stampParts();
