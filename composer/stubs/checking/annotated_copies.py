@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from composer.stubs.project_modules import ProjectModule
 
 FunctionKey: TypeAlias = tuple[str, str]
+# What asks for an attribute that may not be there, or makes it.
+_ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 
 
 @dataclass(slots=True)
@@ -124,8 +126,6 @@ def changed_names(function: FunctionNode) -> set[str]:
     return stored_names(function) | inner
 
 
-# What asks for an attribute that may not be there, or makes it.
-_ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 # The annotations that say less than the class of the node.
 _GENERAL = frozenset({'Node', 'composer.Node', 'Any', 'typing.Any', 'object'})
 
