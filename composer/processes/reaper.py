@@ -18,8 +18,8 @@ Requests and answers are one JSON object a line. Requests: `start` (a number tha
 `command`, `env`, `cwd`, and a descriptor for the output), and `stop` (the number, `signal`,
 `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
 (`code`, negative for a signal), and `gone`, once nothing of its process group is left. Before it
-comes `terminated` if half the timeout of a stop has passed, and SIGTERM follows the signal that
-was asked for, and `killed` if all of it has. A second descriptor is for what a process writes to
+comes `urged` (`signal`) if half the timeout of a stop has passed, and SIGTERM follows the signal
+that was asked for, and `killed` if all of it has. A second descriptor is for what a process writes to
 standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
@@ -69,7 +69,8 @@ class _ProcessGroup:
         self.pid = pid
         self.has_ended = False
         self.is_killed = False
-        self.terminate_at = self.kill_at = _NEVER
+        self.urge_at = self.kill_at = _NEVER
+        self.urge = (signal.SIGTERM, False)
 
     def signal(self, number: int, *, alone: bool = False) -> bool:
         """Signal the group, or its leader alone; return whether any process is left in it."""
@@ -172,9 +173,12 @@ class Reaper:
             return
         now, timeout_sec = time.monotonic(), request['timeout']
         group.kill_at = now + timeout_sec
-        # `ros2 launch` leaves on SIGTERM what it has started, and sends that SIGTERM by itself.
-        if request['signal'] not in _LAST_SIGNALS and not request['alone']:
-            group.terminate_at = now + timeout_sec / 2
+        if request['signal'] not in _LAST_SIGNALS:
+            group.urge_at = now + timeout_sec / 2
+        # `ros2 launch` leaves on SIGTERM what it has started, and sends that SIGTERM by itself. It
+        # heeds no second SIGINT, unless Python lost the first one while it started.
+        if request['alone']:
+            group.urge = (request['signal'], True)
         group.signal(request['signal'], alone=request['alone'])
         # A stopped process handles the signal when it continues.
         group.signal(signal.SIGCONT)
@@ -208,10 +212,11 @@ class Reaper:
                     self._answer('killed', number)
                 group.is_killed = True
                 group.signal(signal.SIGKILL)
-            elif now >= group.terminate_at:
-                group.terminate_at = _NEVER
-                self._answer('terminated', number)
-                group.signal(signal.SIGTERM)
+            elif now >= group.urge_at:
+                group.urge_at = _NEVER
+                urge, alone = group.urge
+                self._answer('urged', number, signal=urge)
+                group.signal(urge, alone=alone)
                 group.signal(signal.SIGCONT)
 
 

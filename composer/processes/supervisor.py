@@ -245,20 +245,20 @@ class ProcessSupervisor:
             self._watchers = [each for each in self._watchers if each.is_alive()]
             self._watchers.append(watcher)
             watcher.start()
-        elif kind == 'terminated':
-            self._report_terminated(run)
+        elif kind == 'urged':
+            self._report_urged(run, signal.Signals(answer['signal']).name)
         elif kind == 'killed':
             self._report_killed(run)
         elif kind == 'gone':
             run.gone.set()
             self._runs.pop(run.number, None)
 
-    def _report_terminated(self, run: ProcessRun) -> None:
+    def _report_urged(self, run: ProcessRun, urge: str) -> None:
         spec, limit_sec = run.process.spec, self._timeout_of(run.process.spec) / 2
         if not run.is_given_up:
             self._logger.warning(
                 f"{self._noun} '{spec.name}' did not end within {limit_sec:g} s of "
-                f'{spec.stop_signal}, and gets SIGTERM'
+                f"{spec.stop_signal}, and gets {urge}{' again' * (urge == spec.stop_signal)}"
             )
 
     def _report_killed(self, run: ProcessRun) -> None:

@@ -70,6 +70,17 @@ def test_a_launch_that_was_killed_starts_again_when_its_programs_are_gone(compos
     assert child.stop() == 0
 
 
+def test_a_launch_that_lost_the_signal_as_it_started_gets_it_again(compose, system):
+    ros2 = system.parent / 'bin/ros2'
+    ros2.write_text(ROS2.replace('SIGINT, end)', 'SIGINT, lambda *_: signal.signal(2, end))'))
+    system.write_text(system.read_text() + '    stop: {timeout: 2}\n')
+    child = compose.run(system)
+    child.wait_for_line('ros2 launch')
+    assert child.stop() == 0
+    assert child.matching("'nav' did not end within 1 s of SIGINT, and gets SIGINT again")
+    assert child.matching('child: ended')
+
+
 def find_children(system):
     """Return the processes with the launch file in their command line."""
     found = []
