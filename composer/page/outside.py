@@ -11,8 +11,10 @@ if TYPE_CHECKING:
 
 _MOST_ENDS = 50
 _LONGEST_NAME = 200
+# An end may be known before its node is.
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
 # Composer's own tools, as the page itself, and who is not known yet.
-_UNSHOWN = ('_composer_client_', '_NODE_NAME_UNKNOWN_')
+_UNSHOWN = ('_composer_client_', _UNKNOWN)
 
 
 class OutsideEnds:
@@ -44,19 +46,26 @@ class OutsideEnds:
             topic: (node.count_publishers(topic), node.count_subscribers(topic))
             for topic in topics
         }
-        for topic, count in counts.items():
+        for topic, count in list(counts.items()):
             # What has only ends of its own is asked for again when their number changes.
             if topic in ends or count != self._counts.get(topic):
-                ends[topic] = _list_ends(node, topic, own)
+                publishers = _name_ends(node.get_publishers_info_by_topic(topic))
+                subscriptions = _name_ends(node.get_subscriptions_info_by_topic(topic))
+                ends[topic] = _list_ends(topic, publishers, subscriptions, own)
+                if any(end.node_name == _UNKNOWN for _, end in (*publishers, *subscriptions)):
+                    del counts[topic]
         ends = {topic: found for topic, found in ends.items() if found}
         self._counts, before = counts, self.by_topic
         self.by_topic = ends
         return ends != before
 
 
-def _list_ends(node: Any, topic: str, own: Collection[str]) -> list[dict[str, str]]:
-    publishers = _name_ends(node.get_publishers_info_by_topic(topic))
-    subscriptions = _name_ends(node.get_subscriptions_info_by_topic(topic))
+def _list_ends(
+    topic: str,
+    publishers: list[tuple[str, Any]],
+    subscriptions: list[tuple[str, Any]],
+    own: Collection[str],
+) -> list[dict[str, str]]:
     found = [
         {
             'kind': kind,

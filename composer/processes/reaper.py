@@ -19,8 +19,8 @@ Requests and answers are one JSON object a line. Requests: `start` (a number tha
 `timeout`). Answers, each with the number: `started` or `failed` (`errno`, `doing`), `ended`
 (`code`, negative for a signal), and `gone`, once nothing of its process group is left. Before it
 comes `urged` (`signal`) if half the timeout of a stop has passed, and SIGTERM follows the signal
-that was asked for, and `killed` if all of it has. A second descriptor is for what a process writes to
-standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
+that was asked for, and `killed` if all of it has. A second descriptor is for what a process writes
+to standard error, if that goes elsewhere, and a third one becomes its descriptor `LINK`.
 Source: https://man7.org/linux/man-pages/man2/prctl.2.html
 """
 

@@ -258,7 +258,7 @@ class ProcessSupervisor:
         if not run.is_given_up:
             self._logger.warning(
                 f"{self._noun} '{spec.name}' did not end within {limit_sec:g} s of "
-                f"{spec.stop_signal}, and gets {urge}{' again' * (urge == spec.stop_signal)}"
+                f'{spec.stop_signal}, and gets {urge}{" again" * (urge == spec.stop_signal)}'
             )
 
     def _report_killed(self, run: ProcessRun) -> None:

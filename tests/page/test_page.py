@@ -19,6 +19,9 @@ pytest.importorskip('rclpy')
 pytest.importorskip('starlette')
 pytest.importorskip('uvicorn')
 
+import rclpy
+
+from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
 from tests.running import DEADLINE_SEC, wait_for
@@ -525,6 +528,30 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
     shared_peer.run(shared_peer.node.destroy_publisher, publisher)
     wait_for(lambda: not find('main svg .external, .outside'), 'nothing outside')
     assert outside() == {}
+
+
+def test_an_end_whose_node_is_not_known_yet_is_asked_for_again(context):
+    from std_msgs.msg import String
+
+    class Discovering:
+        """Knows the ends of a node before the node's name, as while the graph is discovered."""
+
+        def __getattr__(self, name):
+            return getattr(node, name)
+
+        def get_publishers_info_by_topic(self, topic):
+            ends = node.get_publishers_info_by_topic(topic)
+            for end in ends if not knows_names else ():
+                end.node_name = '_NODE_NAME_UNKNOWN_'
+            return ends
+
+    node = rclpy.create_node('other', context=context)
+    node.create_publisher(String, '/words', 1)
+    ends, knows_names = OutsideEnds(), False
+    assert not ends.look(Discovering(), ['/words'], ())
+    knows_names = True
+    assert ends.look(Discovering(), ['/words'], ())
+    assert [end['node'] for end in ends.by_topic['/words']] == ['/other']
 
 
 SCRIPTS = [
