@@ -28,11 +28,13 @@ class Excerpt:
     Attributes:
         file: The path as reports show it, or the `--set` option.
         first: The number of the first line, counted from 1.
+        what: What the lines are of, as a timer's function; empty for a part itself.
     """
 
     file: str
     first: int
     lines: tuple[str, ...]
+    what: str = ''
 
 
 class Excerpts:

@@ -99,9 +99,9 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
 
 def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
-    for shape in region.shapes:
+    for shape in region.drawn_shapes():
         yield f'{indent}{shape.token} {_look(shape, _SHAPES)}'
-    for inner in region.inner.values():
+    for inner in region.open_regions():
         yield f'{indent}subgraph cluster_{inner.token} {{'
         yield (
             f'{indent}  graph [label=<{_text(inner.title)}>, id="{inner.token}", '
@@ -153,27 +153,17 @@ def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 
         ComposerError: Graphviz is missing or failed.
     """
     drawn = _COMMENT.sub('', lay_out(render_dot(picture, folded, direction)))
-    titles = dict(_titles(picture))
+    tokens = picture.tokens()
+    titles = {}
+    for part in picture.parts:
+        said = [picture.findings[index].message for index in part.findings]
+        titles[tokens[part.id]] = '\n'.join(map(escape, [part.title, *part.facts, *said]))
 
     def entitle(match: re.Match[str]) -> str:
         title = titles.get(match[2])
         return f'{match[1]}<title>{html.escape(title)}</title>\n' if title else match[1]
 
     return _TITLE.sub(entitle, drawn).rstrip() + '\n'
-
-
-def _titles(picture: Picture) -> Iterator[tuple[str, str]]:
-    """Yield the token of each part, and its tooltip."""
-    tokens = picture.tokens()
-    titles = {box.id: box.title for box in (*picture.nodes, *picture.channels)}
-    facts = {box.id: ', '.join(box.types) for box in picture.channels}
-    for edge in picture.edges:
-        titles[edge.id] = f'{edge.role} {edge.name} of {titles[edge.node]}'
-        facts[edge.id] = ', '.join(filter(None, (edge.type, edge.policies)))
-    for part in picture.parts:
-        title = ': '.join(filter(None, (titles[part.id], facts.get(part.id))))
-        said = [picture.findings[index].message for index in part.findings]
-        yield tokens[part.id], '\n'.join(map(escape, [title, *said]))
 
 
 def lay_out(text: str) -> str:

@@ -65,10 +65,10 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
         return attributes | more | {'file': file, 'line': span.line}
 
     def describe_edge(edge: Edge) -> dict[str, Any]:
-        names = 'id role name node channel type qos by_parameter findings'
+        names = 'id name node channel type qos by_parameter findings'
         ways = dict(zip(('from', 'to'), edge.ends, strict=True))
         delivery = {'delivery': edge.delivery.way, 'delivery_reason': edge.delivery.reason}
-        return describe(edge, names, **ways, **delivery)
+        return describe(edge, names, role=edge.kind, **ways, **delivery)
 
     about_nodes = 'id kind name namespace description findings'
     about_channels = 'id kind name types external findings'

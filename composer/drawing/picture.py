@@ -13,6 +13,7 @@ from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
 from composer.drawing.delivery import deliveries_of
 from composer.drawing.finding_places import FindingPlaces
+from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.qos import (
     BUILTIN_PROFILES,
     DEFAULT_PROFILE,
@@ -28,7 +29,7 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from composer.checks.connections.topology import Endpoint, Topology
+    from composer.checks.connections.topology import Topology
     from composer.checks.context import CheckContext
     from composer.checks.placement.crossings import Place
     from composer.diagnostics import Diagnostic
@@ -74,14 +75,19 @@ class Box:
     @property
     def title(self) -> str:
         """Its kind and full name."""
-        is_node = self.kind == 'node'
-        return f'{self.kind} {join_names(self.namespace, self.name) if is_node else self.name}'
+        return _title(self.id)
 
     @property
     def facts(self) -> list[str]:
         """What there is to say of it."""
         place = '' if self.types else describe_place(self.place)
-        return [*filter(None, (self.description, place)), *self.types]
+        external = [
+            f'external {kind.noun}s'
+            for kind in CHANNEL_KINDS
+            if kind.channel == self.kind
+            and ('providers' if kind.provides else 'users') in self.external
+        ]
+        return [*filter(None, (self.description, place)), *self.types, *external]
 
 
 @record
@@ -90,8 +96,10 @@ class Edge:
 
     Attributes:
         id: Its kind, the full name of its node, and its name, as in `publisher:/robot/arm:scan`.
-        role: Its kind in words, as in `service client` and `service server`.
-        begins_at_node: Whether messages, requests or goals leave the node here.
+        kind: In words, as in `publisher`, `service client` and `service server`.
+        node: The id of its node or process.
+        channel: The id of its topic, service or action.
+        ends: Both, in the direction of messages, requests and goals.
         qos: The policies that differ from the default of ROS; durations in seconds.
         delivery: Which way its messages, calls or goals go.
         by_parameter: The parameters that its name or depth follows, by these keys.
@@ -99,11 +107,11 @@ class Edge:
     """
 
     id: str
-    role: str
-    begins_at_node: bool
+    kind: str
     name: str
     node: str
     channel: str
+    ends: tuple[str, str]
     type: str
     qos: Mapping[str, Any]
     delivery: Delivery
@@ -112,9 +120,16 @@ class Edge:
     by_parameter: Mapping[str, str]
 
     @property
-    def ends(self) -> tuple[str, str]:
-        """The ids of where it begins and where it ends."""
-        return (self.node, self.channel) if self.begins_at_node else (self.channel, self.node)
+    def title(self) -> str:
+        """Its kind, its name and its node."""
+        return f'{self.kind} {self.name} of {_title(self.node)}'
+
+    @property
+    def facts(self) -> list[str]:
+        """What there is to say of it."""
+        qos = self.policies and f'QoS: {self.policies}'
+        delivery = self.delivery.way and f'delivery: {self.delivery}'
+        return [*filter(None, (self.type, qos, delivery, self.followed))]
 
     @property
     def policies(self) -> str:
@@ -125,6 +140,10 @@ class Edge:
     def followed(self) -> str:
         """What follows parameters, in words; empty for nothing."""
         return ', '.join(f'{key} by parameter {name}' for key, name in self.by_parameter.items())
+
+
+def _title(id_: str) -> str:
+    return id_.replace(':', ' ', 1)
 
 
 def _describe_policy(key: str, value: Any) -> str:
@@ -242,9 +261,10 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
 def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
     for channel in topology.channels.values():
         ends = channel.ends
-        sides: dict[Side, list[Endpoint]] = {
-            'providers': channel.users,
-            'users': channel.providers,
+        sides: set[Side] = {
+            'users' if end.kind.provides else 'providers'
+            for end in ends
+            if getattr(end.entity, 'external', False)
         }
         yield Box(
             f'{channel.kind}:{channel.name}',
@@ -255,11 +275,7 @@ def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
             ends[0].path,
             places.of((channel.kind, channel.name)),
             types=tuple(dict.fromkeys(end.entity.type for end in ends)),
-            external=tuple(
-                side
-                for side, others in sides.items()
-                if any(getattr(end.entity, 'external', False) for end in others)
-            ),
+            external=tuple(sorted(sides)),
         )
 
 
@@ -283,13 +299,13 @@ def _edges(
             owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
             noun = end.kind.noun
             followed = getattr(end.entity, 'by_parameter', {})
+            ways = (node, f'{channel.kind}:{channel.name}')
             yield Edge(
                 f'{noun}:{owner}:{end.entity.name}',
                 f'{noun} server' if noun == channel.kind else noun,
-                sends(channel.kind, provides=end.kind.provides),
                 end.entity.name,
-                node,
-                f'{channel.kind}:{channel.name}',
+                *ways,
+                ways if sends(channel.kind, provides=end.kind.provides) else ways[::-1],
                 end.entity.type,
                 _differing_policies(end.qos, context.spec.qos),
                 deliveries[end.path],

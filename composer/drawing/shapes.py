@@ -8,7 +8,6 @@ from __future__ import annotations
 import textwrap
 from collections import Counter, defaultdict
 from dataclasses import field, replace
-from itertools import count
 from typing import TYPE_CHECKING
 
 from composer.drawing.delivery import OUTSIDE
@@ -20,8 +19,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from composer.checks.placement.crossings import Place
-    from composer.drawing.picture import Edge, Picture
+    from composer.drawing.picture import Box, Edge, Picture
 
 _REMARK_WIDTH = 44
 # Of a part with more findings, the rest is counted.
@@ -33,7 +31,6 @@ class Shape:
     """A node, process or channel as it is drawn; all of its texts are printable.
 
     Attributes:
-        id: The id of what it shows; of the channel, if it stands for external ends.
         kind: `node`, `process`, `topic`, `service`, `action` or `external`; of a folded region,
             `folded`.
         title: Empty for a line.
@@ -43,7 +40,6 @@ class Shape:
     """
 
     token: str
-    id: str
     kind: str
     title: str = ''
     details: tuple[str, ...] = ()
@@ -55,11 +51,15 @@ class Shape:
 class Line(Shape):
     """An arrow between two shapes, with its details beside it.
 
-    Its `id` is empty for waits and external ends, and its `kind` may be `wait`.
+    Its `kind` may be `wait`, too.
+
+    Attributes:
+        role: The kind of the end of a node, as in `publisher`; empty for others.
     """
 
     start: str = ''
     end: str = ''
+    role: str = ''
 
 
 @record
@@ -70,45 +70,35 @@ class Region:
         id: The keys of all regions down to it, as in `box:/worker camera/left`.
         kind: `namespace`, `host` or `worker`.
         title: Its printable name; a namespace in full.
+        is_folded: Whether one shape is drawn for all of it.
     """
 
     token: str = ''
     id: str = 'box:'
     kind: str = 'namespace'
     title: str = '/'
+    is_folded: bool = False
     shapes: list[Shape] = field(default_factory=list)
-    inner: dict[str, Region] = field(default_factory=dict)
-
-    def below(self, place: Place, namespace: str, numbers: Iterator[int]) -> Region:
-        """Return the region of a host, a worker and a namespace; add those that are missing.
-
-        Args:
-            numbers: For their tokens.
-        """
-        # No part of a namespace has a space.
-        places = zip(('host', 'worker'), place, strict=True)
-        keys = [(noun, f'{noun} {name}', f'{noun} {name}') for noun, name in places if name]
-        full = ''
-        for part in filter(None, namespace.split('/')):
-            full += f'/{part}'
-            keys.append(('namespace', part, full))
-        region = self
-        for kind, key, title in keys:
-            if key not in region.inner:
-                token, id_ = f'g{next(numbers)}', f'{region.id}/{key}'
-                region.inner[key] = Region(token, id_, kind, escape(title))
-            region = region.inner[key]
-        return region
-
-    def walk(self) -> Iterator[Region]:
-        """Yield the regions below this one, each before those in it."""
-        for region in self.inner.values():
-            yield region
-            yield from region.walk()
+    inner: list[Region] = field(default_factory=list)
 
     def all_shapes(self) -> list[Shape]:
         """Return the shapes in it and in all regions below."""
-        return [*self.shapes, *(shape for region in self.walk() for shape in region.shapes)]
+        return [*self.shapes, *(shape for each in self.inner for shape in each.all_shapes())]
+
+    def drawn_shapes(self) -> list[Shape]:
+        """Return the shapes in it, and those of the folded regions in it."""
+        folded = (region.as_shape() for region in self.inner if region.is_folded)
+        return [*self.shapes, *folded]
+
+    def as_shape(self) -> Shape:
+        """Return what is drawn for all of it when it is folded."""
+        hidden = self.all_shapes()
+        details = count_kinds(shape.kind for shape in hidden)
+        return Shape(self.token, 'folded', self.title, details, mark=_worst(hidden))
+
+    def open_regions(self) -> list[Region]:
+        """Return the regions in it that are not folded."""
+        return [region for region in self.inner if not region.is_folded]
 
 
 @record
@@ -116,8 +106,9 @@ class Arrangement:
     """All shapes and lines; shapes without a namespace are in `root` itself.
 
     Attributes:
-        regions: All regions, also those that are in a folded one.
-        stands_in: The token of what is drawn for each shape and line that is not drawn itself.
+        regions: All regions, each before those in it.
+        stands_in: The token of what is drawn for each shape, line and region that is in a folded
+            region, and for each line that is drawn with others as one.
     """
 
     root: Region
@@ -133,25 +124,53 @@ def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangemen
         picture: What is drawn.
         folded: The ids of regions that are drawn as one shape.
     """
-    root = Region()
-    tokens, marks, numbers = picture.tokens(), _marks(picture), count()
+    tokens, marks = picture.tokens(), _marks(picture)
+    root, regions = Region(), dict[str, Region]()
     for box in (*picture.nodes, *picture.channels):
+        region = root
+        for kind, key, title in _list_regions(box):
+            id_ = f'{region.id}/{key}'
+            if id_ not in regions:
+                token = f'g{len(regions)}'
+                regions[id_] = Region(token, id_, kind, escape(title), id_ in folded)
+                region.inner.append(regions[id_])
+            region = regions[id_]
         details = tuple(map(escape, box.types))
-        shape = Shape(tokens[box.id], box.id, box.kind, escape(box.name), details, *marks[box.id])
-        root.below(box.place, box.namespace, numbers).shapes.append(shape)
+        shape = Shape(tokens[box.id], box.kind, escape(box.name), details, *marks[box.id])
+        region.shapes.append(shape)
     lines = [_line(edge, tokens, *marks[edge.id]) for edge in picture.edges]
     for channel in picture.channels:
         for side in channel.external:
             token = f'x{tokens[channel.id]}{side[0]}'
-            root.shapes.append(Shape(token, channel.id, 'external', 'external'))
+            root.shapes.append(Shape(token, 'external', 'external'))
             ends = [token, tokens[channel.id]]
             if not sends(channel.kind, provides=side == 'providers'):
                 ends.reverse()
-            lines.append(Line(f'{token}l', '', 'external', start=ends[0], end=ends[1]))
+            lines.append(Line(f'{token}l', 'external', start=ends[0], end=ends[1]))
     for index, wait in enumerate(picture.waits):
         start, end = tokens[wait.target], tokens[wait.waiter]
-        lines.append(Line(f'w{index}', '', 'wait', details=('before',), start=start, end=end))
-    return _fold(root, lines, {edge.id: edge.role for edge in picture.edges}, folded)
+        lines.append(Line(f'w{index}', 'wait', details=('before',), start=start, end=end))
+    stands_in: dict[str, str] = {}
+    for region in regions.values():
+        # What is in a folded region is drawn by the outermost one.
+        by = stands_in.get(region.token, region.token if region.is_folded else '')
+        if by:
+            inside: list[Shape | Region] = [*region.shapes, *region.inner]
+            stands_in.update((part.token, by) for part in inside)
+    drawn = tuple(_bundle(lines, stands_in))
+    return Arrangement(root, drawn, tuple(regions.values()), stands_in)
+
+
+def _list_regions(box: Box) -> Iterator[tuple[str, str, str]]:
+    """Yield the kind, the key and the title of each region around a node or channel."""
+    for kind, name in zip(('host', 'worker'), box.place, strict=True):
+        if name:
+            # No part of a namespace has a space.
+            yield kind, f'{kind} {name}', f'{kind} {name}'
+    full = ''
+    for part in filter(None, box.namespace.split('/')):
+        full += f'/{part}'
+        yield 'namespace', part, full
 
 
 def _line(edge: Edge, tokens: dict[str, str], remarks: tuple[str, ...], mark: str) -> Line:
@@ -160,13 +179,13 @@ def _line(edge: Edge, tokens: dict[str, str], remarks: tuple[str, ...], mark: st
     delivery = '' if edge.delivery.reason == OUTSIDE else str(edge.delivery)
     return Line(
         tokens[edge.id],
-        edge.id,
         edge.channel.partition(':')[0],
         details=tuple(map(escape, filter(None, (edge.policies, delivery, edge.followed)))),
         remarks=remarks,
         mark=mark,
         start=tokens[start],
         end=tokens[end],
+        role=edge.kind,
     )
 
 
@@ -192,25 +211,8 @@ def _marks(picture: Picture) -> dict[str, tuple[tuple[str, ...], str]]:
     return marks
 
 
-def _fold(
-    root: Region, unfolded: Sequence[Line], roles: dict[str, str], folded: Collection[str]
-) -> Arrangement:
-    stands_in: dict[str, str] = {}
-
-    def copy(region: Region) -> Region:
-        open_ones = {}
-        shapes = [*region.shapes]
-        for key, inner in region.inner.items():
-            if inner.id not in folded:
-                open_ones[key] = copy(inner)
-                continue
-            hidden = inner.all_shapes()
-            shapes.append(_folded_shape(inner, hidden))
-            inside: list[Shape | Region] = [*hidden, *inner.walk()]
-            stands_in.update((part.token, inner.token) for part in inside)
-        return replace(region, shapes=shapes, inner=open_ones)
-
-    drawn = copy(root)
+def _bundle(unfolded: Iterable[Line], stands_in: dict[str, str]) -> Iterator[Line]:
+    """Yield the lines that are drawn; add to `stands_in` what is drawn for the others."""
     bundles: dict[tuple[str, str, str], list[Line]] = defaultdict(list)
     for line in unfolded:
         start, end = (stands_in.get(token, token) for token in (line.start, line.end))
@@ -220,26 +222,18 @@ def _fold(
             # Lines between the same two shapes are drawn apart, unless one is a folded region.
             is_single = (start, end) == (line.start, line.end)
             bundles[start, end, line.token if is_single else line.kind].append(line)
-    lines = []
     for index, ((start, end, _), bundle) in enumerate(bundles.items()):
         line = replace(bundle[0], start=start, end=end)
         if len(bundle) > 1:
             line = replace(
                 line,
                 token=f'm{index}',
-                id='',
-                details=count_kinds(roles[each.id] for each in bundle if each.id) or line.details,
+                details=count_kinds(each.role for each in bundle if each.role) or line.details,
                 remarks=(),
                 mark=_worst(bundle),
             )
             stands_in.update({each.token: line.token for each in bundle})
-        lines.append(line)
-    return Arrangement(drawn, tuple(lines), tuple(root.walk()), stands_in)
-
-
-def _folded_shape(region: Region, hidden: Sequence[Shape]) -> Shape:
-    details = count_kinds(shape.kind for shape in hidden if shape.kind != 'external')
-    return Shape(region.token, region.id, 'folded', region.title, details, mark=_worst(hidden))
+        yield line
 
 
 def _worst(parts: Sequence[Shape]) -> str:

@@ -7,29 +7,27 @@ import threading
 from collections import defaultdict
 from dataclasses import asdict, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from composer.application.file_selection import load_given
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
 from composer.diagnostics import describe_finding, relative_path
-from composer.drawing.excerpts import Excerpts
+from composer.drawing.excerpts import Excerpt, Excerpts
 from composer.drawing.graphviz import render_svg
-from composer.drawing.picture import build_picture
+from composer.drawing.picture import Box, Edge, build_picture
 from composer.drawing.shapes import arrange_shapes, count_kinds
-from composer.entity_kinds import CHANNEL_KINDS
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.bindings import node_bindings
 from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.drawing.excerpts import Excerpt
-    from composer.drawing.picture import Edge, Picture, Side
+    from composer.drawing.picture import Picture, Side
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
 
@@ -59,19 +57,19 @@ def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence
     return Drawing(build_picture(context, findings), _list_code(context))
 
 
-def _list_code(context: CheckContext) -> dict[str, list[dict[str, Any]]]:
-    """Return the behaviours of each node with the lines of their functions, by its full name."""
+def _list_code(context: CheckContext) -> dict[str, list[Excerpt]]:
+    """Return the lines of the functions of each node, by its id."""
     return {
-        node.full_name: [
-            {'what': binding.owner, **place}
+        f'node:{node.full_name}': [
+            lines
             for binding in node_bindings(node)
-            if (place := _find_code(context, binding.behaviour))
+            if (lines := _find_code(context, binding.owner, binding.behaviour))
         ]
         for node in context.spec.nodes.values()
     }
 
 
-def _find_code(context: CheckContext, behaviour: BehaviourSpec) -> dict[str, Any] | None:
+def _find_code(context: CheckContext, owner: str, behaviour: BehaviourSpec) -> Excerpt | None:
     module = context.modules.find(behaviour.module) if behaviour.module else None
     if not isinstance(module, ModuleSource) or module.path is None:
         return None
@@ -80,19 +78,18 @@ def _find_code(context: CheckContext, behaviour: BehaviourSpec) -> dict[str, Any
     if found is None or not context.modules.is_of_project(behaviour.module):
         return None
     last = min(found.end_lineno or found.lineno, found.lineno + _MOST_CODE_LINES - 1)
-    lines = module.lines[found.lineno - 1 : last]
-    return {'file': relative_path(str(module.path)), 'first': found.lineno, 'lines': lines}
+    lines = tuple(module.lines[found.lineno - 1 : last])
+    return Excerpt(relative_path(str(module.path)), found.lineno, lines, owner)
 
 
 class Drawing:
     """A system as it is drawn, as a whole and with folded boxes.
 
     Args:
-        code: The behaviours of each node, by its full name, with the lines of their functions.
+        code: The lines of the functions of each node, by its id.
         direction: `LR` or `TB`; empty for the one that is read with less zooming.
 
     Attributes:
-        shown: What the page takes: the SVG, and the parts by their tokens; nothing is folded.
         name: Of the system.
         nodes: The full names of the nodes.
         topics: Those of the topics.
@@ -105,7 +102,7 @@ class Drawing:
     def __init__(
         self,
         picture: Picture,
-        code: Mapping[str, list[dict[str, Any]]] | None = None,
+        code: Mapping[str, list[Excerpt]] | None = None,
         direction: str = '',
     ) -> None:
         self._picture, self._code = picture, code or {}
@@ -117,14 +114,16 @@ class Drawing:
         self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
         self._lock = threading.Lock()
         self._fold = lru_cache(_MOST_FOLDED)(self._describe)
-        self.shown = self._describe(frozenset())
+        self.fold(())
 
     def fold(self, folded: Collection[str]) -> dict[str, Any]:
-        """Return it with these boxes folded; one at a time, and the last ones are kept."""
-        parts = self.shown['parts'].values()
-        key = frozenset(part['id'] for part in parts if 'members' in part).intersection(folded)
+        """Return what the page takes: the SVG, and the parts by their tokens.
+
+        Args:
+            folded: The ids of the boxes that are folded. The last drawings are kept.
+        """
         with self._lock:
-            return self._fold(key) if key else self.shown
+            return self._fold(frozenset(folded))
 
     def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
         """Return it with the ends outside of topics, too, laid out in the same direction."""
@@ -132,8 +131,8 @@ class Drawing:
         channels = []
         for channel in self._picture.channels:
             ends = outside.get(channel.name, ()) if channel.kind == 'topic' else ()
-            shown = dict.fromkeys((*channel.external, *(sides[end['kind']] for end in ends)))
-            channels.append(replace(channel, external=tuple(shown)))
+            external = {*channel.external, *(sides[end['kind']] for end in ends)}
+            channels.append(replace(channel, external=tuple(sorted(external))))
         picture = replace(self._picture, channels=tuple(channels))
         return Drawing(picture, self._code, self._directions[0])
 
@@ -143,12 +142,19 @@ class Drawing:
         }
         self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
         drawn = arrange_shapes(self._picture, folded)
+        parts = dict(_parts(self._picture, self._code))
+        parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
+        parts |= dict(_bundles(drawn, parts))
+        owners = {index: token for token in reversed(parts) for index in parts[token]['findings']}
+        findings = [
+            {**describe_finding(finding), 'part': owners.get(index)}
+            for index, finding in enumerate(self._picture.findings)
+        ]
         return {
             'svg': documents[self._directions[0]],
-            'code': self._code,
-            'folder': str(Path.cwd()),
             'stands_in': drawn.stands_in,
-            **_describe(self._picture, drawn),
+            'parts': parts,
+            'findings': findings,
         }
 
 
@@ -163,48 +169,30 @@ def _shrinkage(document: str) -> float:
     return max(width / _STAGE[0], height / _STAGE[1])
 
 
-def _describe(picture: Picture, drawn: Arrangement) -> dict[str, Any]:
-    parts = dict(_parts(picture))
-    parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
-    parts |= dict(_bundles(drawn, parts))
-    owners: dict[int, str] = {}
-    for token, part in parts.items():
-        for index in part['findings']:
-            owners.setdefault(index, token)
-    findings = [
-        {**describe_finding(finding), 'part': owners.get(index)}
-        for index, finding in enumerate(picture.findings)
-    ]
-    return {'parts': parts, 'findings': findings}
-
-
-def _parts(picture: Picture) -> Iterator[tuple[str, dict[str, Any]]]:
+def _parts(
+    picture: Picture, code: Mapping[str, list[Excerpt]]
+) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the data of each node, channel and edge, by its token."""
     tokens, excerpts = picture.tokens(), Excerpts(picture.positions)
-    ends: dict[str, list[Edge]] = defaultdict(list)
+    edges: dict[str, list[Edge]] = defaultdict(list)
     for edge in picture.edges:
-        ends[edge.node].append(edge)
-        ends[edge.channel].append(edge)
-    for box in (*picture.nodes, *picture.channels):
+        for id_ in edge.ends:
+            edges[id_].append(edge)
+    for part in picture.parts:
         # Of a channel, the lines of its ends.
-        declared = ends[box.id][:_MOST_ENDS] if box.types else [box]
-        near = [tokens[edge.id] for edge in ends[box.id]]
-        name, facts = box.title.partition(' ')[2], box.facts
-        for side in box.external:
-            provides = side == 'providers'
-            kinds = (kind for kind in CHANNEL_KINDS if kind.channel == box.kind)
-            facts += [f'external {kind.noun}s' for kind in kinds if kind.provides == provides]
-        lines = dict.fromkeys(lines for part in declared for lines in excerpts.of(part.path))
-        yield tokens[box.id], _part(box.id, box.kind, name, facts, box.findings, near, lines)
-    names = {node.id: node.name for node in picture.nodes}
-    for edge in picture.edges:
-        qos = edge.policies and f'QoS: {edge.policies}'
-        delivery = edge.delivery.way and f'delivery: {edge.delivery}'
-        facts = [*filter(None, (edge.type, qos, delivery, edge.followed))]
-        name = f'{edge.name} of {names[edge.node]}'
-        near = [tokens[edge.node], tokens[edge.channel]]
-        part = _part(edge.id, edge.role, name, facts, edge.findings, near, excerpts.of(edge.path))
-        yield tokens[edge.id], {**part, 'leaves_node': edge.begins_at_node}
+        is_channel = isinstance(part, Box) and part.types
+        declared = edges[part.id][:_MOST_ENDS] if is_channel else [part]
+        lines = dict.fromkeys(lines for each in declared for lines in excerpts.of(each.path))
+        near = part.ends if isinstance(part, Edge) else [edge.id for edge in edges[part.id]]
+        name = part.title.removeprefix(f'{part.kind} ')
+        yield (
+            tokens[part.id],
+            {
+                **_part(part.id, part.kind, name, part.facts, [tokens[id_] for id_ in near]),
+                'findings': part.findings,
+                'excerpts': [asdict(each) for each in (*lines, *code.get(part.id, ()))],
+            },
+        )
 
 
 def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[str, Any]:
@@ -218,8 +206,8 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
     name = region.title.removeprefix(f'{region.kind} ')
     facts = [', '.join(count_kinds(members.values()))]
     return {
-        **_part(region.id, region.kind, name, facts, (), near),
-        'folded': region.id in {shape.id for shape in drawn.root.all_shapes()},
+        **_part(region.id, region.kind, name, facts, near),
+        'folded': region.is_folded and region.token not in drawn.stands_in,
         'members': list(members),
     }
 
@@ -231,24 +219,11 @@ def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str
         if near:
             start, end = (parts[token] for token in (line.start, line.end))
             id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'
-            yield line.token, _part(id_, 'connections', name, line.details, (), near)
+            yield line.token, _part(id_, 'connections', name, line.details, near)
 
 
 def _part(
-    id_: str,
-    kind: str,
-    name: str,
-    facts: Sequence[str],
-    findings: Sequence[int],
-    near: Sequence[str],
-    excerpts: Iterable[Excerpt] = (),
+    id_: str, kind: str, name: str, facts: Sequence[str], near: Sequence[str]
 ) -> dict[str, Any]:
-    return {
-        'id': id_,
-        'kind': kind,
-        'name': name,
-        'facts': facts,
-        'findings': findings,
-        'near': near,
-        'excerpts': [asdict(each) for each in excerpts],
-    }
+    about = {'id': id_, 'kind': kind, 'name': name, 'facts': facts, 'near': near}
+    return {**about, 'findings': (), 'excerpts': ()}

@@ -18,8 +18,6 @@ const folded = new Set();
 // The connections that begin or end at a part, with their other ends.
 const flows = {down: new Map(), up: new Map()};
 let findings = [];
-let code = {};
-let folder = '';
 let state = {};
 // How far the clock of the browser is ahead of the page's, in seconds.
 let ahead = 0;
@@ -118,7 +116,7 @@ function makeLink(token, text) {
 function makePlace(file, line) {
   const text = line ? `${file}:${line}` : file;
   if (!state.editor || !file || file.startsWith('--')) return document.createTextNode(clean(text));
-  const path = file.startsWith('/') ? file : `${folder}/${file}`;
+  const path = file.startsWith('/') ? file : `${state.folder}/${file}`;
   const link = make('a', text);
   link.href = state.editor.replace('{file}', encodeURI(path)).replace('{line}', line ?? 1);
   return link;
@@ -157,9 +155,6 @@ function describe(token) {
   for (const fact of part.facts) details.append(make('p', fact));
   for (const index of part.findings) details.append(makeFinding(findings[index]));
   for (const excerpt of part.excerpts) details.append(makeExcerpt(excerpt));
-  for (const excerpt of code[part.id.slice(5)] ?? []) {
-    if (part.kind === 'node') details.append(makeExcerpt(excerpt));
-  }
   if (part.members) {
     const button = make('button', part.folded ? 'Unfold' : 'Fold');
     button.type = 'button';
@@ -231,10 +226,7 @@ function reach(token) {
 }
 
 // Returns where messages, calls or goals of a connection begin, and where they end.
-function ends(token) {
-  const part = parts.get(token);
-  return part.leaves_node ? part.near : [...part.near].reverse();
-}
+const ends = (token) => parts.get(token).near;
 
 function isolate() {
   const isolated = chosen !== null && isolation.value !== 'off';
@@ -439,8 +431,6 @@ async function draw(wanted) {
   const hasFocus = svg.contains(document.activeElement);
   parts = new Map(Object.entries(drawing.parts ?? {}));
   findings = drawing.findings ?? [];
-  code = drawing.code ?? {};
-  folder = drawing.folder ?? '';
   tokens.clear();
   standsIn = drawing.stands_in ?? {};
   for (const way of Object.values(flows)) way.clear();

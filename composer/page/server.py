@@ -162,7 +162,11 @@ class PageServer:
     def __init__(self, source: WatchedSystem, options: PageOptions) -> None:
         self._source = source
         self._secret = secrets.token_urlsafe(32)
-        self._settings = {'allows_changes': options.allows_changes, 'editor': options.editor}
+        self._settings = {
+            'allows_changes': options.allows_changes,
+            'editor': options.editor,
+            'folder': str(Path.cwd()),
+        }
         self._recording = Recording()
         # Each window that has it open has one.
         self._streams = 0

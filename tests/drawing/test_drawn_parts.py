@@ -34,7 +34,7 @@ SYSTEM = f"""
 
 @pytest.fixture
 def data(draw, needs_graphviz):
-    return as_json(Drawing(draw(SYSTEM)).shown)
+    return as_json(Drawing(draw(SYSTEM)).fold(()))
 
 
 def as_json(data):
@@ -88,7 +88,7 @@ def test_a_topic_has_the_lines_of_its_ends(data):
 
 
 def test_an_end_tells_its_qos(data):
-    assert data['parts']['e0']['name'] == 'words of talker'
+    assert data['parts']['e0']['name'] == 'words of node /talker'
     assert data['parts']['e0']['facts'] == ['std_msgs/msg/String', 'QoS: depth 5, best_effort']
 
 
@@ -110,7 +110,7 @@ def test_lines_that_a_setting_or_another_file_adds_are_shown_too(draw, needs_gra
     setting = 'nodes.ear.log_level=debug'
     # In a line with the number of one of those in the first file.
     layer = '#\n' * 13 + 'nodes: {ear: {use_sim_time: true}}\n'
-    data = as_json(Drawing(draw(SYSTEM, setting, layer=layer)).shown)
+    data = as_json(Drawing(draw(SYSTEM, setting, layer=layer)).fold(()))
     first, *added = data['parts']['n1']['excerpts']
     assert first['file'] == 'robot.yaml'
     assert sorted((each['file'], each['first'], each['lines']) for each in added) == [
@@ -129,7 +129,7 @@ def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
             publishers: {"out_{{ i }}": std_msgs/msg/String}
             subscriptions: {in: {topic: "out_{{ (i + 3) % 10 }}", type: std_msgs/msg/String, publish: "out_{{ i }}"}}
     """
-    ids = ids_of(Drawing(draw(text)).shown)
+    ids = ids_of(Drawing(draw(text)).fold(()))
     assert sum(bool(re.fullmatch(r'n\d+', each)) for each in ids if each) == 200
     assert sum(bool(re.fullmatch(r'e\d+', each)) for each in ids if each) == 400
 

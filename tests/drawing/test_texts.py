@@ -166,10 +166,10 @@ def test_svg_has_an_element_for_each_part(draw, needs_graphviz):
 def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
     text = html.unescape(render_picture(draw(SYSTEM), 'svg'))
     assert (
-        '<title>publisher scan of node /robot/front/lidar: std_msgs/msg/String, '
-        'depth 5, best_effort\non topic' in text
+        '<title>publisher scan of node /robot/front/lidar\nstd_msgs/msg/String\n'
+        'QoS: depth 5, best_effort\non topic' in text
     )
-    assert '<title>topic /robot/map: std_msgs/msg/String</title>' in text
+    assert '<title>topic /robot/map\nstd_msgs/msg/String\nexternal subscriptions</title>' in text
 
 
 def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):

@@ -389,7 +389,8 @@ def test_a_file_is_shown_that_does_not_run(page, shared_compose):
     assert still.end() == 130
     assert (state['name'], state['runs'], state['drawing']) == ('system', False, 1)
     assert 'node:/ear' in {each['id'] for each in drawing['parts'].values()}
-    assert drawing['code']['/ear'][0]['lines'][0] == 'def hear(node, message):'
+    (ear,) = (each for each in drawing['parts'].values() if each['id'] == 'node:/ear')
+    assert ear['excerpts'][-1]['lines'][0] == 'def hear(node, message):'
 
 
 @pytest.fixture(scope='module')
