@@ -27,10 +27,7 @@ if TYPE_CHECKING:
 
 Way: TypeAlias = Literal['local', 'sent', 'both', '']
 
-_TURNED_OFF = 'local_delivery: false'
 OUTSIDE: Final = 'external: true'
-# One end is in an external process.
-PROCESS: Final = 'external process'
 
 
 @record
@@ -72,9 +69,12 @@ def deliveries_of(
         goes_outside = getattr(sender.entity, 'external', False) and (is_topic or not matched)
         reasons = [
             *(why_crossing(sender, end) for end in matched),
-            *('' if getattr(end.entity, 'local_delivery', True) else _TURNED_OFF for end in ends),
+            *(
+                '' if getattr(end.entity, 'local_delivery', True) else 'local_delivery: false'
+                for end in ends
+            ),
             *(why_sent(known) for end in ends if (known := policies[end.path])),
-            PROCESS if any(end.is_declared for end in ends) else '',
+            'external process' if any(end.is_declared for end in ends) else '',
             'several servers' if not is_topic and len(matched) > 1 else '',
             OUTSIDE if goes_outside else '',
         ]

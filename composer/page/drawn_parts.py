@@ -87,7 +87,6 @@ class Drawing:
 
     Args:
         code: The lines of the functions of each node, by its id.
-        direction: `LR` or `TB`; empty for the one that is read with less zooming.
 
     Attributes:
         name: Of the system.
@@ -99,15 +98,10 @@ class Drawing:
         ComposerError: Graphviz is missing or failed.
     """
 
-    def __init__(
-        self,
-        picture: Picture,
-        code: Mapping[str, list[Excerpt]] | None = None,
-        direction: str = '',
-    ) -> None:
-        self._picture, self._code = picture, code or {}
-        tried = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
-        self._directions = [direction] if direction else tried
+    def __init__(self, picture: Picture, code: Mapping[str, list[Excerpt]] | None = None) -> None:
+        self._picture, self._declared, self._code = picture, picture.channels, code or {}
+        # The one that is read with less zooming stays.
+        self._directions = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
         self.name = picture.name
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
@@ -125,16 +119,21 @@ class Drawing:
         with self._lock:
             return self._fold(frozenset(folded))
 
-    def with_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> Drawing:
-        """Return it with the ends outside of topics, too, laid out in the same direction."""
+    def show_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> None:
+        """Draw the ends outside of topics from now on, besides those that the files declare.
+
+        Args:
+            outside: See `OutsideEnds`.
+        """
         sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
         channels = []
-        for channel in self._picture.channels:
+        for channel in self._declared:
             ends = outside.get(channel.name, ()) if channel.kind == 'topic' else ()
             external = {*channel.external, *(sides[end['kind']] for end in ends)}
             channels.append(replace(channel, external=tuple(sorted(external))))
-        picture = replace(self._picture, channels=tuple(channels))
-        return Drawing(picture, self._code, self._directions[0])
+        with self._lock:
+            self._picture = replace(self._picture, channels=tuple(channels))
+            self._fold.cache_clear()
 
     def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
         documents = {

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 _ANSWER_SEC = 3.0
 _RELOAD_SEC = 60.0
 _MOST = 500
-_LONGEST_TEXT = 100_000
 _LONGEST_VALUE = 10_000
 
 
@@ -85,7 +84,7 @@ def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:
     """
     _, interface = LiveGraph(client, _ANSWER_SEC).find(kind, name)
     message = interface.Request() if kind == 'service' else interface()
-    text = render_yaml(plain_message(message)) if message.get_fields_and_field_types() else ''
+    text = _render(message) if message.get_fields_and_field_types() else ''
     return {'text': text, 'type': interface_name(interface)}
 
 
@@ -207,7 +206,7 @@ def _publish(graph: LiveGraph, topic: str, text: str) -> str:
 
 
 def _render(message: Any) -> str:
-    return render_yaml(plain_message(message))[:_LONGEST_TEXT]
+    return render_yaml(plain_message(message))
 
 
 def _range(descriptor: Any) -> list[float] | None:

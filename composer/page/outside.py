@@ -49,52 +49,49 @@ class OutsideEnds:
         for topic, count in list(counts.items()):
             # What has only ends of its own is asked for again when their number changes.
             if topic in ends or count != self._counts.get(topic):
-                publishers = _name_ends(node.get_publishers_info_by_topic(topic))
-                subscriptions = _name_ends(node.get_subscriptions_info_by_topic(topic))
-                ends[topic] = _list_ends(topic, publishers, subscriptions, own)
-                if any(end.node_name == _UNKNOWN for _, end in (*publishers, *subscriptions)):
+                found = [
+                    (join_names(end.node_namespace, end.node_name), end)
+                    for end in (
+                        *node.get_publishers_info_by_topic(topic),
+                        *node.get_subscriptions_info_by_topic(topic),
+                    )
+                ]
+                ends[topic] = _list_ends(topic, found, own)
+                if any(end.node_name == _UNKNOWN for _, end in found):
                     del counts[topic]
-        ends = {topic: found for topic, found in ends.items() if found}
         self._counts, before = counts, self.by_topic
-        self.by_topic = ends
-        return ends != before
+        self.by_topic = {topic: listed for topic, listed in ends.items() if listed}
+        return self.by_topic != before
 
 
 def _list_ends(
-    topic: str,
-    publishers: list[tuple[str, Any]],
-    subscriptions: list[tuple[str, Any]],
-    own: Collection[str],
+    topic: str, ends: list[tuple[str, Any]], own: Collection[str]
 ) -> list[dict[str, str]]:
-    found = [
+    """Return the ends outside among all ends of a topic, each of which has its node's name."""
+    ends_here = [each for each in ends if each[0] in own]
+    listed = [
         {
-            'kind': kind,
+            'kind': end.endpoint_type.name.lower(),
             'node': name[:_LONGEST_NAME],
             'type': end.topic_type[:_LONGEST_NAME],
-            **_find_problem(topic, name, end, [each for each in others if each[0] in own]),
+            **_find_problem(topic, name, end, ends_here),
         }
-        for kind, ends, others in (
-            ('publisher', publishers, subscriptions),
-            ('subscription', subscriptions, publishers),
-        )
         for name, end in ends
         if name not in own and not end.node_name.startswith(_UNSHOWN)
     ]
-    return sorted(found, key=lambda end: (end['kind'], end['node'], end['type']))[:_MOST_ENDS]
-
-
-def _name_ends(ends: Iterable[Any]) -> list[tuple[str, Any]]:
-    return [(join_names(each.node_namespace, each.node_name), each) for each in ends]
+    return sorted(listed, key=lambda end: (end['kind'], end['node'], end['type']))[:_MOST_ENDS]
 
 
 def _find_problem(
-    topic: str, name: str, end: Any, own: Iterable[tuple[str, Any]]
+    topic: str, name: str, end: Any, ends_here: Iterable[tuple[str, Any]]
 ) -> dict[str, str]:
     """Return why no message goes between an end outside and one of the system, and which."""
     from composer.runtime.health.unmatched import find_mismatch
     from composer.runtime.messages.qos_profiles import read_policies
 
-    for node, here in own:
+    for node, here in ends_here:
+        if here.endpoint_type == end.endpoint_type:
+            continue
         publishes = here.endpoint_type.name == 'PUBLISHER'
         policies = read_policies(here.qos_profile)
         if reason := find_mismatch(end, here.topic_type, policies, publishes=publishes):

@@ -1,13 +1,14 @@
 'use strict';
 // Everything shown comes from the data of the page, and is set as text, never as markup.
-const stage = document.getElementById('stage');
-const search = document.getElementById('search');
-const isolation = document.getElementById('isolation');
+const byId = (id) => document.getElementById(id);
+const stage = byId('stage');
+const search = byId('search');
+const isolation = byId('isolation');
 const MOST_MATCHES = 200;
+const MOST_PROBLEMS = 400;
 const MOST_LINES = 300;
 const MOST_POINTS = 60;
 const SAMPLE_MS = 1000;
-const byId = (id) => document.getElementById(id);
 
 // What is shown: the drawing with its parts by token, and the latest state.
 let svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
@@ -102,11 +103,16 @@ function make(tag, text = '', className = '') {
   return element;
 }
 
-function makeLink(token, text) {
+function makeButton(text, press) {
   const button = make('button', text);
   button.type = 'button';
+  button.addEventListener('click', press);
+  return button;
+}
+
+function makeLink(token, text) {
+  const button = makeButton(text, () => choose(token, true));
   button.dataset.token = token;
-  button.addEventListener('click', () => choose(token, true));
   const item = make('li');
   item.append(button);
   return item;
@@ -146,7 +152,7 @@ function makeFinding(finding) {
 
 function describe(token) {
   const part = parts.get(token);
-  const details = document.getElementById('details');
+  const details = byId('details');
   details.replaceChildren();
   if (!part) return;
   const heading = make('h2', part.name);
@@ -156,9 +162,7 @@ function describe(token) {
   for (const index of part.findings) details.append(makeFinding(findings[index]));
   for (const excerpt of part.excerpts) details.append(makeExcerpt(excerpt));
   if (part.members) {
-    const button = make('button', part.folded ? 'Unfold' : 'Fold');
-    button.type = 'button';
-    button.addEventListener('click', () => fold(part));
+    const button = makeButton(part.folded ? 'Unfold' : 'Fold', () => fold(part));
     const inside = make('details');
     inside.append(make('summary', `In it (${part.members.length})`), makeLinks(part.members.map(
       (each) => [each, `${parts.get(each).kind} ${parts.get(each).name}`],
@@ -193,7 +197,7 @@ function replace(list, items) {
 }
 
 // Selection, by pointer, keyboard, list or address.
-const shapeOf = (token) => document.getElementById(standsIn[token] ?? token);
+const shapeOf = (token) => byId(standsIn[token] ?? token);
 let chosen = null;
 // The id of what a new address asks for, until it or something else is selected.
 let wished;
@@ -299,7 +303,7 @@ function choose(token, mustBeSeen) {
 }
 
 function makeSelectable(token, part) {
-  const element = document.getElementById(token);
+  const element = byId(token);
   if (!element) return;
   element.classList.add('known');
   if (part.kind === 'node') element.dataset.id = part.id;
@@ -377,9 +381,9 @@ document.addEventListener('keydown', (event) => {
     choose(null, false);
   }
 });
-document.getElementById('zoom-in').addEventListener('click', () => zoom(0.8));
-document.getElementById('zoom-out').addEventListener('click', () => zoom(1.25));
-document.getElementById('fit').addEventListener('click', fit);
+byId('zoom-in').addEventListener('click', () => zoom(0.8));
+byId('zoom-out').addEventListener('click', () => zoom(1.25));
+byId('fit').addEventListener('click', fit);
 byId('fold-all').addEventListener('click', foldAll);
 isolation.addEventListener('change', () => { isolate(); remember(); });
 
@@ -474,11 +478,7 @@ function levelOf(row) {
 
 function levelsOfNodes() {
   const levels = new Map();
-  for (const row of rows()) levels.set(row.node, worse(levelOf(row), levels.get(row.node) ?? 'ok'));
-  for (const [node, lifecycle] of Object.entries(state.status?.lifecycles ?? {})) {
-    if (lifecycle !== 'active') levels.set(node, worse('warn', levels.get(node) ?? 'ok'));
-  }
-  for (const node of state.status?.stopped ?? []) levels.set(node, 'warn');
+  for (const {level, node} of state.problems ?? []) levels.set(node, worse(level, levels.get(node) ?? 'ok'));
   return levels;
 }
 
@@ -586,7 +586,7 @@ function showProblems() {
     items.push({level: finding.severity, text: `${finding.message} (${place})`, part});
   }
   byId('none').hidden = items.length > 0;
-  showItems(byId('problems'), items);
+  showItems(byId('problems'), items.slice(0, MOST_PROBLEMS));
 }
 
 function showTree() {
@@ -750,13 +750,6 @@ async function act(wish, told) {
   told.className = found.problem ? 'error' : '';
 }
 
-function makeButton(text, wish, told) {
-  const button = make('button', text);
-  button.type = 'button';
-  button.addEventListener('click', () => act(wish, told));
-  return button;
-}
-
 // A field for a value or a payload, with what came of it below.
 function makeForm(label, text, wish, verb) {
   const form = make('form');
@@ -787,7 +780,8 @@ async function offerActs() {
     const name = part.id.slice(5);
     const verbs = state.status?.stopped?.includes(name) ? ['Start'] : ['Restart', 'Stop'];
     for (const verb of verbs) {
-      section.append(makeButton(`${verb} the node`, {action: verb.toLowerCase(), name}, told), ' ');
+      const wish = {action: verb.toLowerCase(), name};
+      section.append(makeButton(`${verb} the node`, () => act(wish, told)), ' ');
     }
     section.append(told);
     const buttons = section.querySelectorAll('button');
@@ -839,9 +833,7 @@ function offerMessage() {
   section.replaceChildren();
   const part = parts.get(chosen);
   if (!state.runs || part?.kind !== 'topic') return;
-  const button = make('button', 'Look at messages');
   const [about, text] = [make('p', '', 'kind'), make('pre')];
-  button.type = 'button';
   let looks = false;
   const look = async () => {
     if (!looks || !button.isConnected) return;
@@ -855,7 +847,7 @@ function offerMessage() {
     if (found.problem || Date.now() - begun > SAMPLE_MS) button.click();
     else setTimeout(look, SAMPLE_MS);
   };
-  button.addEventListener('click', () => {
+  const button = makeButton('Look at messages', () => {
     looks = !looks;
     button.textContent = looks ? 'Pause' : 'Go on';
     look();

@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 _ORDER = {'error': 0, 'stale': 1, 'warn': 2, 'warning': 2}
-_MOST = 200
 _MS_PER_SEC = 1000
 
 
@@ -31,7 +30,7 @@ def list_problems(
         for end in ends
         if 'problem' in end
     ]
-    return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))[:_MOST]
+    return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))
 
 
 def _problem(level: str, text: str, node: str = '') -> dict[str, str]:

@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from contextlib import aclosing, suppress
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from time import monotonic, time
@@ -68,7 +68,8 @@ _HEADERS = {
     'referrer-policy': 'no-referrer',
     'x-content-type-options': 'nosniff',
 }
-_MOST_STREAMS = 16
+# Each window has one that stays open.
+_MOST_CONNECTIONS = 64
 # A browser that does not read so long is dropped.
 _SEND_SEC = 10.0
 _KEEP_ALIVE_SEC = 15.0
@@ -168,14 +169,12 @@ class PageServer:
             'folder': str(Path.cwd()),
         }
         self._recording = Recording()
-        # Each window that has it open has one.
-        self._streams = 0
         self._socket = socket.socket()
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             self._socket.bind(('127.0.0.1', options.port))
             # Who opens the address at once is served once all is ready.
-            self._socket.listen(4 * _MOST_STREAMS)
+            self._socket.listen(_MOST_CONNECTIONS)
         except OSError as error:
             message = f'port {options.port} cannot be used: {error.strerror}'
             raise ComposerError(message, help='choose another one with --port') from error
@@ -194,7 +193,7 @@ class PageServer:
             server_header=False,
             date_header=False,
             timeout_graceful_shutdown=1,
-            limit_concurrency=4 * _MOST_STREAMS,
+            limit_concurrency=_MOST_CONNECTIONS,
             lifespan='off',
         )
         self._source.start()
@@ -331,32 +330,17 @@ class PageServer:
             return _json({'problem': f'{text} ({more})' if more else text}, 504)
 
     async def _events(self, _request: Request) -> Response:
-        if self._streams >= _MOST_STREAMS:
-            return PlainTextResponse(f'{_MOST_STREAMS} windows have it open', status_code=503)
-        return _Events(self._list_states(), media_type='text/event-stream')
+        return StreamingResponse(self._list_states(), media_type='text/event-stream')
 
     async def _list_states(self) -> AsyncIterator[str]:
         """Yield the newest state after each change."""
-        self._streams += 1
         told, told_sec = None, 0.0
-        try:
-            while True:
-                self._source.looked_at = now = monotonic()
-                if told is not self._source.state or now > told_sec + _KEEP_ALIVE_SEC:
-                    told, told_sec = self._source.state, now
-                    yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
-                await asyncio.sleep(_PAUSE_SEC)
-        finally:
-            self._streams -= 1
-
-
-class _Events(StreamingResponse):
-    """Ends its iterator, too, when the browser leaves or does not read."""
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        iterator: Any = self.body_iterator
-        async with aclosing(iterator):
-            await super().__call__(scope, receive, send)
+        while True:
+            self._source.looked_at = now = monotonic()
+            if told is not self._source.state or now > told_sec + _KEEP_ALIVE_SEC:
+                told, told_sec = self._source.state, now
+                yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
+            await asyncio.sleep(_PAUSE_SEC)
 
 
 def _json(data: Any, code: int = 200, longest: int = _LONGEST_TEXT) -> Response:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic, time
@@ -70,10 +71,7 @@ class WatchedSystem:
         self.system: RunningSystem | None = None
         self.looked_at = monotonic()
         self._saved: SavedFiles | None = None
-        self._lines = 0
-        self._rows: list[dict[str, Any]] = []
-        # As the files say, without ends outside.
-        self._declared: Drawing | None = None
+        self._numbers = count(1)
         self._outside = OutsideEnds()
         self._ended = Event()
         self._thread = Thread(target=self._run, name='composer-page', daemon=True)
@@ -153,7 +151,7 @@ class WatchedSystem:
                 found = {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
             self._note_heard(said, found)
             outside = self._outside.by_topic
-            topics = self._declared.topic_of_ends if self._declared else {}
+            topics = self.drawing.topic_of_ends if self.drawing else {}
             self.state = self.state | {
                 'name': said['name'],
                 'runs': True,
@@ -180,8 +178,8 @@ class WatchedSystem:
             row['heard'] = now if row['worker'] else found['heard']
         silent = {each['name'] for each in said['workers']}
         silent -= {row['worker'] for row in found['entities']}
-        found['entities'] += [row for row in self._rows if row['worker'] in silent]
-        self._rows = found['entities']
+        rows = before.get('entities', ())
+        found['entities'] += [row for row in rows if row['worker'] in silent]
 
     def _draw(self, client: Client, system: RunningSystem) -> None:
         problem = ''
@@ -191,24 +189,24 @@ class WatchedSystem:
             file = Path((system.status or {}).get('file', ''))
             paths = [file, *(Path(each) for each in given['layers'])]
             self._saved = SavedFiles(text, paths, given['words'], given['set_values'])
-            self._declared = draw_files(paths, given['words'], given['set_values'])
+            drawing = draw_files(paths, given['words'], given['set_values'])
+            if self._outside.by_topic:
+                drawing.show_outside(self._outside.by_topic)
+            self.drawing = drawing
         except ComposerError as error:
             # The page is for the same computer as the files, and shows the rest without.
-            self._declared, problem = None, str(error)
+            self.drawing, problem = None, str(error)
         self._outside.forget()
-        self._show(problem)
+        self._note_drawing(problem)
 
     def _find_outside(self, client: Client, said: dict[str, Any]) -> None:
-        if (drawing := self._declared) is not None:
+        if (drawing := self.drawing) is not None:
             own = {*said['nodes'], *said['components'], *drawing.nodes}
             if self._outside.look(client.node, drawing.topics, own):
-                self._show()
+                drawing.show_outside(self._outside.by_topic)
+                self._note_drawing()
 
-    def _show(self, problem: str = '') -> None:
-        outside = self._outside.by_topic
-        self.drawing = self._declared
-        if self._declared is not None and outside:
-            self.drawing = self._declared.with_outside(outside)
+    def _note_drawing(self, problem: str = '') -> None:
         number = self.state['drawing'] + 1
         self.state = self.state | {'drawing': number, 'drawing_problem': problem}
 
@@ -221,9 +219,8 @@ class WatchedSystem:
         client.node.create_subscription(Log, '/rosout', self._note_line, profile)
 
     def _note_line(self, message: Any) -> None:
-        self._lines += 1
         line = {
-            'number': self._lines,
+            'number': next(self._numbers),
             'time': message.stamp.sec + message.stamp.nanosec / 1e9,
             'level': _LEVELS.get(message.level, 'info'),
             'name': message.name[:_LONGEST_LINE],
