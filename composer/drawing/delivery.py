@@ -57,7 +57,7 @@ def deliveries_of(
         profiles: The named profiles of the file.
     """
     is_topic = channel.kind == 'topic'
-    policies = {end.path: _policies_of(end, profiles) for end in channel.ends}
+    policies = {end.path: policies_of(end, profiles) for end in channel.ends}
     senders, receivers = channel.providers, channel.users
     if not is_topic:
         senders, receivers = receivers, senders
@@ -88,7 +88,7 @@ def deliveries_of(
         yield end.path, _join(heard[end.path])
 
 
-def _policies_of(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any] | None:
+def policies_of(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any] | None:
     """Return the QoS of an end; `None` if it is invalid, which has a finding."""
     try:
         return resolve_qos(end.qos, profiles) if end.qos else None
@@ -112,6 +112,4 @@ def _join(deliveries: list[Delivery]) -> Delivery:
     """Return the way of what comes from several ends."""
     ways = {each.way for each in deliveries}
     reason = next((each.reason for each in deliveries if each.reason), '')
-    if len(ways) > 1:
-        return Delivery('both', reason)
-    return deliveries[0] if deliveries else Delivery()
+    return Delivery('both' if len(ways) > 1 else next(iter(ways), ''), reason)

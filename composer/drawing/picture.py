@@ -11,16 +11,14 @@ from composer.checks.connections.topology import full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
-from composer.drawing.delivery import deliveries_of
+from composer.drawing.delivery import deliveries_of, policies_of
 from composer.drawing.finding_places import FindingPlaces
 from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.qos import (
     BUILTIN_PROFILES,
     DEFAULT_PROFILE,
     INFINITE,
-    QosError,
     format_policy_value,
-    resolve_qos,
 )
 from composer.language.specs import ComponentSpec, ProcessSpec
 from composer.names import expand_name, expand_namespace, join_names
@@ -29,7 +27,7 @@ from composer.records import record
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from composer.checks.connections.topology import Topology
+    from composer.checks.connections.topology import Endpoint, Topology
     from composer.checks.context import CheckContext
     from composer.checks.placement.crossings import Place
     from composer.diagnostics import Diagnostic
@@ -307,7 +305,7 @@ def _edges(
                 *ways,
                 ways if sends(channel.kind, provides=end.kind.provides) else ways[::-1],
                 end.entity.type,
-                _differing_policies(end.qos, context.spec.qos),
+                _differing_policies(end, context.spec.qos),
                 deliveries[end.path],
                 end.path,
                 places.of(end.path),
@@ -315,15 +313,12 @@ def _edges(
             )
 
 
-def _differing_policies(spec: QosSpec | None, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
+def _differing_policies(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
     """Return the policies that differ from the profile `default`; none if the QoS is invalid.
 
     Topics and services have the same defaults (`rmw/qos_profiles.h`).
     """
-    try:
-        policies = resolve_qos(spec, profiles) if spec else {}
-    except QosError:
-        return {}
+    policies = policies_of(end, profiles) or {}
     usual = BUILTIN_PROFILES[DEFAULT_PROFILE]
     return {key: value for key, value in policies.items() if value != usual.get(key, INFINITE)}
 
