@@ -9,13 +9,6 @@ from __future__ import annotations
 import keyword
 from typing import TYPE_CHECKING
 
-from composer.interfaces.descriptions import (
-    ActionDescription,
-    FieldDescription,
-    FieldType,
-    MessageDescription,
-    ServiceDescription,
-)
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.records import record
 
@@ -23,7 +16,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from composer.interfaces.catalogue import InterfaceCatalogue, InterfaceKind
-    from composer.interfaces.descriptions import InterfaceDescription
+    from composer.interfaces.descriptions import (
+        FieldType,
+        InterfaceDescription,
+        MessageDescription,
+    )
 
 SUPPORT = 'composer_stubs'
 PAYLOADS = f'{SUPPORT}.payloads'
@@ -171,23 +168,9 @@ _ARRAY_INTEGERS = frozenset(INTEGER_RANGES) - {'byte'}
 
 
 _KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
-# What the classes of every service and every action refer to.
-_OF_SERVICES = ('service_msgs', 'builtin_interfaces')
-_OF_ACTIONS = (*_OF_SERVICES, 'action_msgs', 'unique_identifier_msgs')
-
-_UUID = FieldDescription('goal_id', FieldType('message', 'unique_identifier_msgs/msg/UUID'))
-_TIME = FieldType('message', 'builtin_interfaces/msg/Time')
-_EVENT_INFO = FieldType('message', 'service_msgs/msg/ServiceEventInfo')
-# The parts of an action as `Action.Impl` names them.
-_IMPL = (
-    ('SendGoalService', '{}_SendGoal'),
-    ('GetResultService', '{}_GetResult'),
-    ('FeedbackMessage', '{}_FeedbackMessage'),
-)
-_COMMON_IMPL = (
-    ('CancelGoalService', 'action_msgs/srv/CancelGoal'),
-    ('GoalStatusMessage', 'action_msgs/msg/GoalStatusArray'),
-)
+# The parts of services and actions that behaviours name; of the other ones, nothing is said.
+_PARTS = {'srv': ('Request', 'Response'), 'action': ('Goal', 'Result', 'Feedback')}
+_OTHERS = {'srv': 'Event', 'action': 'Impl'}
 
 
 def write_packages(
@@ -229,31 +212,10 @@ def _write_package(
 
 
 def _used_packages(interfaces: Mapping[str, InterfaceDescription | None]) -> Iterator[str]:
-    for interface in interfaces.values():
-        if interface is None:
-            continue
-        yield from {'srv': _OF_SERVICES, 'action': _OF_ACTIONS}.get(
-            interface.name.split('/')[1], ()
-        )
-        for message in _list_messages(interface):
-            for field in message.fields:
-                if field.type.nested is not None:
-                    yield field.type.nested.partition('/')[0]
-
-
-def _list_messages(interface: InterfaceDescription) -> Iterator[MessageDescription]:
-    """Yield all messages of an interface, with those that ROS adds to services and actions."""
-    if isinstance(interface, ServiceDescription):
-        yield from interface.parts
-        yield _describe_event(interface)
-    elif isinstance(interface, ActionDescription):
-        yield from interface.parts
-        for service in _inner_services(interface):
-            yield from _list_messages(service)
-        feedback = FieldDescription('feedback', FieldType('message', interface.feedback.name))
-        yield MessageDescription(f'{interface.name}_FeedbackMessage', (_UUID, feedback))
-    else:
-        yield interface
+    parts = (part for each in interfaces.values() if each is not None for part in each.parts)
+    for field in (field for part in parts for field in part.fields):
+        if field.type.nested is not None:
+            yield field.type.nested.partition('/')[0]
 
 
 def _write_interfaces(
@@ -271,47 +233,20 @@ def _write_interfaces(
     yield from classes
 
 
-def _describe_event(service: ServiceDescription) -> MessageDescription:
-    parts = {'request': service.request.name, 'response': service.response.name}
-    fields = (
-        FieldDescription(name, FieldType('message', part, None, 'bounded', 1))
-        for name, part in parts.items()
-    )
-    return MessageDescription(
-        f'{service.name}_Event', (FieldDescription('info', _EVENT_INFO), *fields)
-    )
-
-
-def _inner_services(action: ActionDescription) -> Iterator[ServiceDescription]:
-    goal = FieldDescription('goal', FieldType('message', action.goal.name))
-    result = FieldDescription('result', FieldType('message', action.result.name))
-    accepted = FieldDescription('accepted', FieldType('bool'))
-    status = FieldDescription('status', FieldType('int8'))
-    answers = {
-        'SendGoal': ((_UUID, goal), (accepted, FieldDescription('stamp', _TIME))),
-        'GetResult': ((_UUID,), (status, result)),
-    }
-    for name, (request, response) in answers.items():
-        full_name = f'{action.name}_{name}'
-        yield ServiceDescription(
-            full_name,
-            MessageDescription(f'{full_name}_Request', request),
-            MessageDescription(f'{full_name}_Response', response),
-        )
-
-
 def _write_interface(
     name: str, interface: InterfaceDescription | None, imports: StubImports
 ) -> Iterator[str]:
     if interface is None:
         yield from ('', f'{_last(name)}: {imports.take("typing", "Any")}')
         return
-    for message in _list_messages(interface):
+    for message in interface.parts:
         yield from _write_message(message, imports)
-    if isinstance(interface, ServiceDescription):
-        yield from _write_service(interface.name, imports)
-    elif isinstance(interface, ActionDescription):
-        yield from _write_action(interface, imports)
+    _, kind, last = name.split('/')
+    if kind in _PARTS:
+        alias, anything = imports.take('typing', 'TypeAlias'), imports.take('typing', 'Any')
+        yield from ('', f'class {last}:')
+        yield from (f'    {part}: {alias} = {last}_{part}' for part in _PARTS[kind])
+        yield f'    {_OTHERS[kind]}: {anything}'
 
 
 def _write_message(message: MessageDescription, imports: StubImports) -> Iterator[str]:
@@ -343,27 +278,6 @@ def _write_message(message: MessageDescription, imports: StubImports) -> Iterato
             yield f'    {field.name.upper()}__DEFAULT: {of_class}[{types.read(field.type)}]'
     yield '    @classmethod'
     yield f'    def get_fields_and_field_types(cls) -> dict[{text}, {text}]: ...'
-
-
-def _write_service(name: str, imports: StubImports) -> Iterator[str]:
-    last, alias = _last(name), imports.take('typing', 'TypeAlias')
-    yield from ('', f'class {last}:')
-    yield from (
-        f'    {part}: {alias} = {last}_{part}' for part in ('Request', 'Response', 'Event')
-    )
-
-
-def _write_action(action: ActionDescription, imports: StubImports) -> Iterator[str]:
-    for service in _inner_services(action):
-        yield from _write_service(service.name, imports)
-    last, alias = _last(action.name), imports.take('typing', 'TypeAlias')
-    yield from ('', f'class {last}:')
-    yield from (f'    {part}: {alias} = {last}_{part}' for part in ('Goal', 'Result', 'Feedback'))
-    yield '    class Impl:'
-    yield from (f'        {name}: {alias} = {form.format(last)}' for name, form in _IMPL)
-    yield from (
-        f'        {name}: {alias} = {imports.message(full)}' for name, full in _COMMON_IMPL
-    )
 
 
 def _last(name: str) -> str:
