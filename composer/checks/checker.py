@@ -15,9 +15,7 @@ from composer.checks.behaviours.behaviour_functions import (
 from composer.checks.behaviours.blocked_groups import check_blocked_groups
 from composer.checks.behaviours.missing_modules import check_missing_modules
 from composer.checks.behaviours.shipped_behaviours import (
-    check_compared_arguments,
-    check_monitors,
-    check_transforms,
+    check_shipped_behaviours,
 )
 from composer.checks.behaviours.unknown_and_unused import check_uses
 from composer.checks.connections.channels import check_channel_types, check_servers
@@ -82,9 +80,7 @@ NODE_RULES: tuple[CheckRule, ...] = (
     check_behaviour_sources,
     check_lifecycles,
     check_missing_modules,
-    check_compared_arguments,
-    check_transforms,
-    check_monitors,
+    check_shipped_behaviours,
     check_processes,
     check_process_parameters,
     check_annotations,

@@ -6,7 +6,6 @@ if that is not among the parameter's choices. What `behaviours.monitor` watches 
 
 from __future__ import annotations
 
-import ast
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,9 +13,9 @@ from typing import TYPE_CHECKING
 from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.payload_checks import check_payload
+from composer.language.specs import SubscriptionSpec
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
-from composer.python_source.syntax import positional_names, stored_names
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -25,22 +24,19 @@ if TYPE_CHECKING:
     from composer.checks.behaviours.message_expressions import ExpressionValue
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
-    from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec, SubscriptionSpec
-    from composer.python_source.syntax import FunctionNode
+    from composer.language.bindings import Binding
+    from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec
     from composer.yaml_text.positions import DataPath
 
-_MODULE, _FUNCTION = 'behaviours.topics', 'transform'
 
-
-def check_transforms(context: CheckContext) -> Iterator[Diagnostic]:
-    """The fields are those of the published type, and expressions use the received message."""
+def check_shipped_behaviours(context: CheckContext) -> Iterator[Diagnostic]:
+    """Check the arguments of the behaviours that say more of them than annotations do."""
     for node in context.spec.nodes.values():
-        for subscription in node.subscriptions.values():
-            behaviour = subscription.behaviour
-            if behaviour and (behaviour.module, behaviour.function) == (_MODULE, _FUNCTION):
-                fields = behaviour.arguments.get('fields')
-                if isinstance(fields, dict) and is_shipped(context, _MODULE):
-                    yield from _check_fields(context, node, subscription, fields)
+        for binding in context.bindings(node):
+            behaviour = binding.behaviour
+            check = _CHECKS.get(behaviour.name)
+            if check is not None and is_shipped(context, behaviour.module):
+                yield from check(context, node, binding)
 
 
 def is_shipped(context: CheckContext, name: str) -> bool:
@@ -56,12 +52,13 @@ def _is_shipped(path: Path, name: str) -> bool:
     return path.resolve() == own.resolve()
 
 
-def _check_fields(
-    context: CheckContext,
-    node: NodeSpec,
-    subscription: SubscriptionSpec,
-    fields: dict[str, object],
+def _check_transform(
+    context: CheckContext, node: NodeSpec, binding: Binding
 ) -> Iterator[Diagnostic]:
+    """The fields are those of the published type, and expressions use the received message."""
+    subscription, fields = binding.entity, binding.behaviour.arguments.get('fields')
+    if not isinstance(subscription, SubscriptionSpec) or not isinstance(fields, dict):
+        return
     # The import of jinja2 takes a tenth of the time of a check, and most files do not need it.
     from composer.checks.behaviours.message_expressions import evaluate_over
 
@@ -139,36 +136,20 @@ def _family(field_type: FieldType) -> set[str]:
     return {'whole', 'part'} if field_type.kind.startswith('float') else {'whole'}
 
 
-_MONITOR = 'behaviours.monitor'
-_WATCHING = ('watch', 'diagnose')
-
-
-def check_compared_arguments(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check arguments that are compared with parameters against their choices."""
-    pairs: dict[str, set[tuple[str, str]]] = {}
-    for node in context.spec.nodes.values():
-        if not any(parameter.choices for parameter in node.parameters.values()):
-            continue
-        for behaviour in (binding.behaviour for binding in context.bindings(node)):
-            if behaviour.arguments and behaviour.name not in pairs:
-                module = context.modules.find(behaviour.module)
-                name = behaviour.function
-                source = module.find_function(name) if isinstance(module, ModuleSource) else None
-                function = source.definition if source else None
-                pairs[behaviour.name] = _compared_pairs(function) if function else set()
-            for argument, name in sorted(pairs.get(behaviour.name, ())):
-                parameter, value = node.parameters.get(name), behaviour.arguments.get(argument)
-                if value is None or not parameter or not parameter.choices:
-                    continue
-                if value not in parameter.choices and _is_known(context, parameter):
-                    yield context.at_value(
-                        (*behaviour.path[:-1], 'with', argument),
-                        'bad-argument',
-                        f"{behaviour.function} compares '{argument}' with the parameter '{name}', "
-                        f'which is never {value!r}',
-                        help=suggest(value, parameter.choices, 'its choices are'),
-                        related=[context.related(parameter.path, 'the parameter and its choices')],
-                    )
+def _check_mux(context: CheckContext, node: NodeSpec, binding: Binding) -> Iterator[Diagnostic]:
+    """The parameter `selected` may be the source, if it has choices."""
+    behaviour, parameter = binding.behaviour, node.parameters.get('selected')
+    source, choices = behaviour.arguments.get('source'), parameter and parameter.choices
+    if source is None or not parameter or not choices or source in choices:
+        return
+    if _is_known(context, parameter):
+        yield context.at_value(
+            (*behaviour.path[:-1], 'with', 'source'),
+            'bad-argument',
+            f"mux compares 'source' with the parameter 'selected', which is never {source!r}",
+            help=suggest(source, choices, 'its choices are'),
+            related=[context.related(parameter.path, 'the parameter and its choices')],
+        )
 
 
 def _is_known(context: CheckContext, parameter: ParameterSpec) -> bool:
@@ -180,54 +161,24 @@ def _is_known(context: CheckContext, parameter: ParameterSpec) -> bool:
     )
 
 
-def _compared_pairs(function: FunctionNode) -> set[tuple[str, str]]:
-    """Return the parameters of a function that it compares with parameters of its node."""
-    stored = stored_names(function)
-    own = {*positional_names(function)[:1]} - stored
-    pairs: set[tuple[str, str]] = set()
-    for node in ast.walk(function):
-        match node:
-            case ast.Compare(left=left, ops=[ast.Eq()], comparators=[right]):
-                for one, other in ((left, right), (right, left)):
-                    match one, other:
-                        case (
-                            ast.Attribute(ast.Attribute(ast.Name(owner), 'parameters'), name),
-                            ast.Name(argument),
-                        ) if owner in own and argument not in stored:
-                            pairs.add((argument, name))
-    return pairs
-
-
-def check_monitors(context: CheckContext) -> Iterator[Diagnostic]:
-    """Check that for each topic that is watched, the same node counts messages."""
-    for node in context.spec.nodes.values():
-        if node.path not in context.incomplete:
-            yield from _check_monitors_of(context, node)
-
-
-def _check_monitors_of(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]:
-    behaviours = [binding.behaviour for binding in context.bindings(node)]
-    watching = [
-        each
-        for each in behaviours
-        if (each.module == _MONITOR and each.function in _WATCHING) and 'topic' in each.arguments
-    ]
-    if not watching or not is_shipped(context, _MONITOR):
-        return
-    if any(_may_count(context, each) for each in behaviours):
-        # Others may call its functions themselves.
-        return
+def _check_monitor(
+    context: CheckContext, node: NodeSpec, binding: Binding
+) -> Iterator[Diagnostic]:
+    """The same node counts the messages of a topic that is watched."""
+    behaviours = [each.behaviour for each in context.bindings(node)]
     topics = [each.arguments.get('topic') for each in behaviours if each.function == 'count']
-    otherwise = f"bind '{_MONITOR}:count' to a subscription, with the same 'topic'"
-    for behaviour in watching:
-        topic = behaviour.arguments['topic']
-        if topic is not None and topic not in topics:
-            yield context.at_value(
-                (*behaviour.path[:-1], 'with', 'topic'),
-                'bad-argument',
-                f"nothing in node '{node.name}' counts the messages of '{topic}'",
-                help=suggest(topic, topics, 'it counts', otherwise),
-            )
+    behaviour, topic = binding.behaviour, binding.behaviour.arguments.get('topic')
+    if topic is None or topic in topics or node.path in context.incomplete:
+        return
+    # Others may call its functions themselves.
+    if not any(_may_count(context, each) for each in behaviours):
+        otherwise = "bind 'behaviours.monitor:count' to a subscription, with the same 'topic'"
+        yield context.at_value(
+            (*behaviour.path[:-1], 'with', 'topic'),
+            'bad-argument',
+            f"nothing in node '{node.name}' counts the messages of '{topic}'",
+            help=suggest(topic, topics, 'it counts', otherwise),
+        )
 
 
 def _may_count(context: CheckContext, behaviour: BehaviourSpec) -> bool:
@@ -240,3 +191,11 @@ def _may_count(context: CheckContext, behaviour: BehaviourSpec) -> bool:
     is_named = any('monitor' in line for line in module.lines)
     # What it imports may import it.
     return is_named or any(context.modules.is_of_project(each) for each in module.imports.values())
+
+
+_CHECKS = {
+    'behaviours.topics:transform': _check_transform,
+    'behaviours.topics:mux': _check_mux,
+    'behaviours.monitor:watch': _check_monitor,
+    'behaviours.monitor:diagnose': _check_monitor,
+}
