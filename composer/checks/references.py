@@ -15,7 +15,6 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
 from composer.language.values.start_reader import read_from_file
 from composer.programs import base_environment, find_program_problem, shell_environment
-from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import passes_message_on
 from composer.spelling import suggest
 
@@ -81,8 +80,7 @@ def _passes_on(
     behaviour = subscription.behaviour
     if behaviour is None:
         return not context.was_dropped((*subscription.path, 'behaviour'))
-    module = context.modules.find(behaviour.module)
-    source = module.find_function(behaviour.function) if isinstance(module, ModuleSource) else None
+    source = context.modules.find_function(behaviour.module, behaviour.function)
     if source is None or source.definition is None or not passes_message_on(source.definition):
         return False
     # A message can be the only field of another one.

@@ -76,10 +76,7 @@ def _find_generators(context: CheckContext) -> Iterator[str]:
         for timer in node.timers.values():
             if (behaviour := timer.behaviour) is None:
                 continue
-            module = context.modules.find(behaviour.module)
-            source = None
-            if not isinstance(module, MissingModule):
-                source = module.find_function(behaviour.function)
+            source = context.modules.find_function(behaviour.module, behaviour.function)
             if source is not None and source.kind is not None and source.kind.is_generator:
                 yield behaviour.name
 

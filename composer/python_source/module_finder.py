@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from composer.confidential import list_lineage
 from composer.input_limits import MAX_TOKENS_OF_MODULES
-from composer.python_source.modules import ModuleSource, read_module
+from composer.python_source.modules import FunctionSource, ModuleSource, read_module
 from composer.records import record
 from composer.spelling import find_nearest
 
@@ -97,6 +97,11 @@ class ModuleFinder:
                 self._tokens_left -= module.tokens
                 self._found[name] = module
         return self._found[name]
+
+    def find_function(self, module: str, function: str) -> FunctionSource | None:
+        """Return a function of a module; `None` if it, or the module, does not exist."""
+        found = self.find(module)
+        return found.find_function(function) if isinstance(found, ModuleSource) else None
 
     def list_read(self, search_path: list[Path]) -> dict[Path, ModuleSource]:
         """Return the modules that were read, by their files, if they were searched here."""

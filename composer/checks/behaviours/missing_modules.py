@@ -13,6 +13,7 @@ import importlib.util
 import re
 import sys
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 from composer.diagnostics import diagnostic_at
@@ -124,15 +125,12 @@ class _Walk:
         """Check the imports with which a behaviour begins."""
         behaviour = binding.behaviour
         module = self.context.modules.find(behaviour.module)
-        key = behaviour.name
-        if isinstance(module, MissingModule) or key in self._visited:
+        if isinstance(module, MissingModule) or behaviour.name in self._visited:
             return
-        self._visited.add(key)
-        source = module.find_function(behaviour.function)
-        definition = source.definition if source else None
-        for statement in definition.body if definition else ():
-            if not isinstance(statement, _PLAIN):
-                break
+        self._visited.add(behaviour.name)
+        function = module.find_function(behaviour.function)
+        body = function.definition.body if function and function.definition else ()
+        for statement in takewhile(lambda each: isinstance(each, _PLAIN), body):
             if isinstance(statement, _Import):
                 importer = _Importer(behaviour.module, module, binding)
                 for name in self._check(statement, importer):
@@ -253,41 +251,40 @@ class _Library:
         attributes = [node for node in nodes if isinstance(node, ast.Attribute)]
         stored = {node.attr for node in attributes if isinstance(node.ctx, ast.Store)}
         asked = set(map(id, _asked_first(nodes)))
-        for node in nodes:
+        for node in (each for each in nodes if id(each) not in asked):
             names: list[tuple[str, str, ast.AST]] = []
-            rule = 'missing-module' if isinstance(node, ast.ImportFrom) else 'unknown-attribute'
+            rule = 'unknown-attribute'
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                rule = _RULE
                 names = [(node.module, alias.name, alias) for alias in node.names]
             elif isinstance(node, ast.Attribute) and node.attr not in stored:
                 first, dot, rest = dotted_name(node.value).partition('.')
                 if first in imports:
                     names = [(imports[first] + dot + rest, node.attr, node)]
-            for owner, name, place in names if id(node) not in asked else ():
-                own_rule, found = self._explain(owner, name)
-                if found is not None:
-                    yield Problem(
-                        own_rule or rule, found[0], module.span_of(place, name), found[1]
-                    )
+            for owner, name, place in names:
+                if problem := self._explain(owner, name, rule):
+                    rule, message, advice = problem
+                    yield Problem(rule, message, module.span_of(place, name), advice)
 
-    def _explain(self, owner: str, name: str) -> tuple[str, tuple[str, str | None] | None]:
-        """Return the rule that a name breaks for certain, if it has one, with what is wrong."""
+    def _explain(self, owner: str, name: str, rule: str) -> tuple[str, str, str | None] | None:
+        """Return the rule that a name breaks for certain, if it does, and what is wrong."""
         interface, package = find_interface(owner), owner.partition('.')[0]
+        problem: tuple[str, str | None] | None = None
         if name.startswith('_') or name == '*':
-            return '', None
+            return None
         if interface is not None:
-            return 'unknown-field', self._missing_in_class(interface, name)
-        if package in self.context.catalogue.packages():
-            return 'missing-module', self._missing_in_package(owner, name)
-        if self.context.modules.is_of_project(package) and package != 'composer':
-            return '', None
-        return '', self._missing_in_module(owner, name)
+            rule, problem = 'unknown-field', self._missing_in_class(interface, name)
+        elif package in self.context.catalogue.packages():
+            rule, problem = _RULE, self._missing_in_package(owner, name)
+        elif package == 'composer' or not self.context.modules.is_of_project(package):
+            problem = self._missing_in_module(owner, name)
+        return (rule, *problem) if problem else None
 
     def _missing_in_class(self, interface: str, name: str) -> tuple[str, str | None] | None:
         types = self.context.types
         description = types.describe(interface)
-        if description is None or name in _OF_CLASSES or types.may_have_constant(interface, name):
-            return None
-        if description.field(name) is not None:
+        is_there = description is None or description.field(name) is not None
+        if is_there or name in _OF_CLASSES or types.may_have_constant(interface, name):
             return None
         known = types.constants(interface)
         return f"{in_python(interface)} has no constant '{name}'", suggest(name, known, 'it has')

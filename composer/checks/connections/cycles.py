@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 from composer.checks.behaviours.shipped_behaviours import is_shipped
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import always_answers
 from composer.records import record
 
@@ -190,10 +189,7 @@ def _passes_on(context: CheckContext, behaviour: BehaviourSpec) -> bool:
 
 def _always_answers(context: CheckContext, behaviour: BehaviourSpec) -> bool:
     """Return whether every path through a behaviour returns a payload."""
-    module = context.modules.find(behaviour.module)
-    if not isinstance(module, ModuleSource):
-        return False
-    source = module.find_function(behaviour.function)
+    source = context.modules.find_function(behaviour.module, behaviour.function)
     if source is None or source.definition is None:
         return False
     kinds = (FunctionKind.PLAIN, FunctionKind.COROUTINE)
