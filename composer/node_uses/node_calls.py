@@ -16,6 +16,7 @@ from composer.node_uses.reading import (
     Payload,
     RemoteParameter,
 )
+from composer.python_source.annotations import find_interface
 from composer.python_source.modules import read_signature
 from composer.schema.structure import find_problem
 
@@ -188,8 +189,7 @@ def _type_named(run: Run, node: ast.expr, scope: Scope) -> str | None:
     """Return the full name of the interface type that an expression is, if that is known."""
     value = run.names.value_of(node, scope)
     if isinstance(value, External):
-        parts = value.name.split('.')
-        return '/'.join(parts) if parts[-2:-1] and parts[-2] in ('msg', 'srv', 'action') else None
+        return find_interface(value.name)
     return only_text(value)
 
 

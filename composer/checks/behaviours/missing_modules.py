@@ -211,22 +211,20 @@ class _Walk:
         source, name = self.context.modules.find(home), f'{home}.{alias.name}'
         if not isinstance(source, ModuleSource) or self.context.modules.has(name):
             return
-        place = importer.source.span_of(alias, alias.name)
-        known = {*source.functions, *source.constants}
+        place, top = importer.source.span_of(alias, alias.name), source.top
+        bound = {*top.statements, *top.stored_again}
         if source.path is None:
             missing = self.context.modules.find_missing(name)
             help_text = did_you_mean(missing.nearest if missing else None)
             self._report(f"there is no module '{name}'", help_text, importer, place)
-        elif not (source.is_open or source.syntax_error or alias.name in known):
-            # It may be bound where nobody looks, unless it is only misspelt.
-            nearest = find_nearest(alias.name, known)
-            top = source.top
-            bound = top.statements.keys() | top.stored_again
-            is_bound = top.is_open or alias.name in bound or alias.name[:2] == '__'
-            if not top.is_dynamic and (nearest or not is_bound):
-                message = f"{home} has no '{alias.name}'"
-                help_text = suggest(alias.name, known or bound, 'it has')
-                self._report(message, help_text, importer, place)
+        elif not (
+            source.syntax_error
+            or (source.is_open or top.is_dynamic)
+            or (alias.name in bound or alias.name.startswith('__'))
+        ):
+            known = {*source.functions, *source.constants} or bound
+            help_text = suggest(alias.name, known, 'it has')
+            self._report(f"{home} has no '{alias.name}'", help_text, importer, place)
 
     def _report(
         self, message: str, help_text: str | None, importer: _Importer, place: Span

@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from composer.interfaces.descriptions import FieldType, MessageDescription
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.payload_checks import check_payload
 from composer.language.specs import SubscriptionSpec
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from composer.checks.behaviours.message_expressions import ExpressionValue
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
+    from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.bindings import Binding
     from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec
     from composer.yaml_text.positions import DataPath
@@ -63,8 +63,8 @@ def _check_transform(
     from composer.checks.behaviours.message_expressions import evaluate_over
 
     publisher = node.publishers.get(subscription.publish or '')
-    heard = _describe(context, subscription.type)
-    made = _describe(context, publisher.type) if publisher else None
+    heard = context.types.describe(subscription.type)
+    made = context.types.describe(publisher.type) if publisher else None
     for name, expression in fields.items():
         path, value = (*subscription.path, 'with', 'fields', name), None
         if heard:
@@ -75,11 +75,6 @@ def _check_transform(
             value = None if wrong else value
         if made:
             yield from _check_field(context, made, value, path)
-
-
-def _describe(context: CheckContext, type_name: str) -> MessageDescription | None:
-    description = context.catalogue.describe(type_name)
-    return description if isinstance(description, MessageDescription) else None
 
 
 def _check_field(
@@ -96,7 +91,7 @@ def _check_field(
             message = f"'{part}' of {owner.name} is {field.type}, and has no fields"
             yield context.at_key(path, 'unknown-field', message)
             return
-        owner = _describe(context, field.type.nested)
+        owner = context.types.describe(field.type.nested)
     else:
         part = last
     field = owner.field(part) if owner else None
@@ -120,7 +115,7 @@ def _may_take(context: CheckContext, wanted: FieldType, given: FieldType) -> boo
         return bool(wanted.array and given.array) or bool(wanted.nested)
     if wanted.nested is None:
         return given.nested is None and _family(wanted) >= _family(given)
-    description = _describe(context, wanted.nested)
+    description = context.types.describe(wanted.nested)
     # One with a single field takes what this takes.
     return wanted.nested == given.nested or description is None or len(description.fields) == 1
 

@@ -6,6 +6,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.behaviour_bodies import bound_at
+from composer.checks.parameters import OF_EVERY_NODE
 from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import (
     BEHAVIOUR_KEYS,
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from composer.node_uses.reading import NodeUse, Reading
     from composer.yaml_text.positions import DataPath
 
-# Parameters that every node of rclpy declares.
-_OF_EVERY_NODE = {'use_sim_time', 'start_type_description_service'}
 # Parameters that rclpy itself reads.
 _OF_ROS = 'qos_overrides.'
 # The places of behaviours and of `publish`.
@@ -138,7 +137,7 @@ def _is_typo(
 def _is_declared(node: NodeSpec, kind: str, name: str, lost: list[DataPath]) -> bool:
     """Return whether a node declares something, or may declare it under a misspelt key."""
     section = KIND_OF_NOUN[kind].section
-    of_all = _OF_EVERY_NODE if kind == 'parameter' else set()
+    of_all = OF_EVERY_NODE if kind == 'parameter' else set()
     if name in {*getattr(node, section), *of_all}:
         return True
     return any(
@@ -228,7 +227,7 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
 
 
 def _is_of_ros(kind: str, name: str) -> bool:
-    return kind == 'parameter' and (name in _OF_EVERY_NODE or name.startswith(_OF_ROS))
+    return kind == 'parameter' and (name in OF_EVERY_NODE or name.startswith(_OF_ROS))
 
 
 def _may_hide_a_use(path: DataPath) -> bool:
