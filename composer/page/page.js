@@ -715,15 +715,36 @@ function sumOf(found) {
   return sum;
 }
 
+// Sections about the selection stay while it is selected, also if the drawing is made anew.
+function begin(section) {
+  const id = state.runs ? parts.get(chosen)?.id : undefined;
+  if (section.about !== id) {
+    section.replaceChildren();
+    Object.assign(section, {about: id, said: undefined});
+  }
+  return id;
+}
+
+// What is said again changes nothing, and what somebody types stays.
+function fill(section, id, said, makeItems) {
+  const isUsed = (field) => field.value !== field.defaultValue || field === document.activeElement;
+  const fields = [...section.querySelectorAll('input, textarea')];
+  if (section.about !== id || section.said === said || fields.some(isUsed)) return;
+  section.said = said;
+  section.replaceChildren(...makeItems());
+}
+
 async function askParameters() {
   const section = byId('parameters');
-  section.replaceChildren();
+  const id = begin(section);
   const part = parts.get(chosen);
-  if (!state.runs || !part?.id.startsWith('node:')) return;
-  const asked = chosen;
-  const found = await get(`api/parameters?node=${encodeURIComponent(part.id.slice(5))}`);
-  if (chosen !== asked) return;
-  if (!Array.isArray(found)) { section.append(make('p', found.problem, 'kind')); return; }
+  if (!id?.startsWith('node:')) return;
+  const found = await get(`api/parameters?node=${encodeURIComponent(id.slice(5))}`);
+  fill(section, id, JSON.stringify(found), () => showParameters(part, found));
+}
+
+function showParameters(part, found) {
+  if (!Array.isArray(found)) return [make('p', found.problem, 'kind')];
   const list = make('dl');
   for (const each of found) {
     const about = [each.range ? `${each.range[0]} to ${each.range[1]}` : '',
@@ -736,7 +757,7 @@ async function askParameters() {
     } else value.append(`${text}  ${clean(about)}`);
     list.append(make('dt', each.name), value);
   }
-  section.append(make('h2', 'Parameters'), make('p', `as of ${clock()}`, 'kind'), list);
+  return [make('h2', 'Parameters'), make('p', `as of ${clock()}`, 'kind'), list];
 }
 
 // What changes the system, where the page may.
@@ -756,7 +777,7 @@ function makeForm(label, text, wish, verb) {
   const field = make(text.includes('\n') ? 'textarea' : 'input');
   const told = make('pre');
   told.setAttribute('role', 'status');
-  field.value = text;
+  field.defaultValue = text;
   field.setAttribute('aria-label', label);
   if (field.tagName === 'TEXTAREA') field.rows = Math.min(12, text.split('\n').length);
   const button = make('button', verb);
@@ -771,29 +792,27 @@ function makeForm(label, text, wish, verb) {
 async function offerActs() {
   const section = byId('acts');
   const focused = [...section.querySelectorAll('button')].indexOf(document.activeElement);
-  section.replaceChildren();
+  const id = begin(section);
   const part = parts.get(chosen);
-  if (!state.allows_changes || !state.runs || !part) return;
+  if (!state.allows_changes || !id) return;
   if (part.kind === 'node') {
-    const told = make('p');
-    told.setAttribute('role', 'status');
-    const name = part.id.slice(5);
+    const name = id.slice(5);
     const verbs = state.status?.stopped?.includes(name) ? ['Start'] : ['Restart', 'Stop'];
-    for (const verb of verbs) {
-      const wish = {action: verb.toLowerCase(), name};
-      section.append(makeButton(`${verb} the node`, () => act(wish, told)), ' ');
-    }
-    section.append(told);
+    fill(section, id, verbs[0], () => {
+      const told = make('p');
+      told.setAttribute('role', 'status');
+      return [...verbs.flatMap((verb) => [makeButton(`${verb} the node`,
+        () => act({action: verb.toLowerCase(), name}, told)), ' ']), told];
+    });
     const buttons = section.querySelectorAll('button');
     if (focused >= 0) buttons[Math.min(focused, buttons.length - 1)].focus();
   } else if (part.kind === 'topic' || part.kind === 'service') {
     const [verb, action] = part.kind === 'topic' ? ['Publish once', 'publish'] : ['Call', 'call'];
-    const asked = chosen;
     const found = await get(`api/template?kind=${part.kind}&name=${encodeURIComponent(part.name)}`);
-    if (chosen !== asked || found.problem) return;
+    if (found.problem) return;
     const wish = () => ({action, name: part.name});
-    section.append(make('h2', verb), make('p', found.type, 'kind'),
-      makeForm(`Fields of ${found.type}`, `${found.text}\n`, wish, verb));
+    fill(section, id, JSON.stringify(found), () => [make('h2', verb), make('p', found.type, 'kind'),
+      makeForm(`Fields of ${found.type}`, `${found.text}\n`, wish, verb)]);
   }
 }
 
@@ -830,9 +849,9 @@ byId('record').addEventListener('click', () => act(
 // Messages of the chosen topic, one a second, from when somebody asks for them until he pauses.
 function offerMessage() {
   const section = byId('message');
-  section.replaceChildren();
+  const before = section.about;
   const part = parts.get(chosen);
-  if (!state.runs || part?.kind !== 'topic') return;
+  if (begin(section) === before || part?.kind !== 'topic') return;
   const [about, text] = [make('p', '', 'kind'), make('pre')];
   let looks = false;
   const look = async () => {

@@ -511,11 +511,13 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
     wait_for(lambda: text_of('#details h2').startswith('/left/words'), 'the topic')
     wait_for(lambda: outside() == {}, 'only ends of its own')
     assert not find('main svg .external, .outside')
+    click(browser, '#message button')
     name = shared_peer.node.get_fully_qualified_name()
     publisher = shared_peer.run(
         shared_peer.node.create_publisher, String, '/left/words', qos_profile_sensor_data
     )
     wait_for(lambda: find('main svg .external.node'), 'the publisher in the graph')
+    assert text_of('#message button') == 'Pause'
     for place in ('#live .outside', '#tree .outside'):
         wait_for(lambda place=place: name in text_of(place), place)
     assert outside() == {'/left/words': [('publisher', name)]}
@@ -787,11 +789,17 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     browser.get(f'http://127.0.0.1:{acting.port}/#service%3A%2Fleft%2Fswitch')
     click(browser, '#acts form button')
     wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
+    browser.get(f'http://127.0.0.1:{acting.port}/#node%3A%2Fleft%2Ftalker')
+    typed = wait_for(lambda: find('#parameters input'), 'a parameter')[0]
+    typed.send_keys('4')
+    drawn = find('main svg')
     text = (shared_compose.folder / 'system.yaml').read_text()
     (shared_compose.folder / 'system.yaml').write_text(re.sub(r'rate: \d+', 'rate: 8', text))
     wait_for(lambda: 'period' in text_of('#plan'), 'the plan')
     click(browser, '#reload')
     wait_for(lambda: '~1 timer' in text_of('#last'), 'the reload')
+    wait_for(lambda: find('main svg') not in (drawn, []), 'the new drawing')
+    assert typed.get_property('value').endswith('4')
     # All can use it, in light and dark; what is not chosen is dim in the drawing.
     for rest in ([['main svg']], []):
         for scheme in ('light', 'dark'):
