@@ -152,6 +152,7 @@ print('same')
 
 
 @pytest.mark.usefixtures('domain_id')
+@pytest.mark.long
 def test_a_service_of_every_kind_answers(
     run_python: RunPython,
     parts: tuple[Path, Path],
