@@ -56,13 +56,15 @@ class Session:
         is_closed: Whether nothing begins by it any more.
         is_late: Whether it is closed as soon as it has looked.
         has_looked: Whether what was ready when it was opened has begun, as far as it could.
+        error: What it raises when it ends.
     """
 
-    __slots__ = ('admits_one', 'has_ended', 'has_looked', 'is_closed', 'is_late', 'work')
+    __slots__ = ('admits_one', 'error', 'has_ended', 'has_looked', 'is_closed', 'is_late', 'work')
 
     def __init__(self, *, admits_one: bool) -> None:
         self.admits_one = admits_one
         self.work: Any = None
+        self.error: BaseException | None = None
         self.has_ended = False
         self.is_closed = False
         self.has_looked = False

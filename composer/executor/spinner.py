@@ -100,16 +100,21 @@ class Spinner:
         self._errors.append(error)
         self.notifier.notify()
 
-    def _raise_error(self) -> None:
-        """Raise the oldest error that was reported and not raised yet."""
-        try:
-            error = self._errors.popleft()
-        except IndexError:
-            return
-        try:
-            raise error
-        finally:
-            del error  # Its traceback has this frame.
+    def _takes_error(self, session: Session) -> bool:
+        """Tell whether `session` raises an error: it takes the oldest that nobody raises yet."""
+        if session.error is None:
+            with suppress(IndexError):
+                session.error = self._errors.popleft()
+        return session.error is not None
+
+    def _raise_error(self, session: Session) -> None:
+        """Raise the error of `session`, if it takes one."""
+        if self._takes_error(session):
+            error, session.error = session.error, None
+            try:
+                raise error  # type: ignore[misc]
+            finally:
+                del error  # Its traceback has this frame.
 
     def wake(self) -> None:
         """Make the leader and all threads that wait look again."""
@@ -147,7 +152,7 @@ class Spinner:
         finally:
             if not self.scheduler.is_spinning:
                 self._wait_for_end(GRACE_SEC)
-        self._raise_error()
+        self._raise_error(session)
 
     def spin_once(
         self, is_over: Callable[[], bool], timeout_sec: float | None, *, is_watched: bool = False
@@ -156,12 +161,12 @@ class Spinner:
         session = Session(admits_one=True)
         with self._open(session, is_watched=is_watched):
             self._wait_until_over(session, is_over, timeout_sec)
-        self._raise_error()
+        self._raise_error(session)
 
     @contextmanager
     def _open(self, session: Session, *, is_watched: bool) -> Iterator[None]:
         """Let callbacks begin by `session` meanwhile, in the place of one that spins itself."""
-        self._raise_error()
+        self._raise_error(session)
         with self._parts.executor.waiting():
             try:
                 self.wait_set_thread.add_user(session)
@@ -181,7 +186,7 @@ class Spinner:
         """Wait until `session` is over; until its callback has ended, if that takes no time."""
 
         def has_begun_or_is_over() -> bool:
-            if session.work or self._errors or not self._is_alive() or is_over():
+            if session.work or self._takes_error(session) or not self._is_alive() or is_over():
                 return True
             # There is none yet, or an error has ended it.
             self.workers.start()
