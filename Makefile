@@ -3,6 +3,9 @@
 # Both have the versions of constraints/; with NEWEST=1, a .venv-newest has the newest ones.
 CONFIG ?= configs/greeter.yaml
 PYTHON ?= python3
+# Hundreds of processes are started, also where Python must not write what it compiles: none of
+# them has to compile Composer. The rules' examples may be wrong on purpose.
+COMPILE := -m compileall -q -x 'composer/rules/.*/' composer behaviours
 # Most tests wait, for processes and discovery: two cores serve more processes of tests than two.
 WORKERS ?= 6
 VENV := .venv
@@ -34,7 +37,7 @@ up: $(VENV)/ready
 	@$(BIN)/composer up $(CONFIG)
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal $(ARGS)
+	env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest --numprocesses $(WORKERS) --dist worksteal $(ARGS)
 
 # Also those that take longer than a minute; and C++ programs, where the environment has them.
 test-all: export LONG := 1
@@ -85,4 +88,5 @@ $(VENV)/ready: pyproject.toml Makefile $(CONSTRAINTS)
 	@rm -f $@
 	@$(PYTHON) -m venv $(VENV_FLAGS) $(VENV)
 	@$(BIN)/pip install --quiet --disable-pip-version-check $(PIP_FLAGS) --editable '.[$(EXTRAS)]'
+	@$(BIN)/python $(COMPILE)
 	@touch $@

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
@@ -23,28 +24,36 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from composer.diagnostics import Span
+    from composer.scenarios.scenario_files import LoadedScenarios
 
 
 class CaseFailedError(ComposerError):
-    """A case failed; its only argument is the report."""
+    """A case failed, or its file has errors; the only argument is the report."""
 
 
 class ScenarioFile(pytest.File):
     """A scenario file."""
 
+    _loaded: LoadedScenarios
+
     def collect(self) -> Iterator[ScenarioCase]:
         """Yield its cases.
 
         Raises:
-            CollectError: The file, or the system that it names, has errors.
+            CollectError: It cannot be read as a whole.
         """
-        loaded = load_scenarios(Path(_shown(self)))
-        findings = AbsentPackages().leave_out(check_scenarios(loaded, InterfaceCatalogue()))
-        if has_errors(findings):
-            raise self.CollectError('\n\n'.join(map(render_finding, findings)))
-        for name, case in (loaded.spec.cases if loaded.spec else {}).items():
+        self._loaded = loaded = load_scenarios(Path(_shown(self)))
+        if loaded.spec is None or has_errors(loaded.document.diagnostics):
+            raise self.CollectError(self.errors)
+        for name, case in loaded.spec.cases.items():
             span = loaded.positions.key(case.path)
             yield ScenarioCase.from_parent(self, name=name, span=span)
+
+    @cached_property
+    def errors(self) -> str:
+        """The findings in it and its system, if one is an error; nothing but a run needs them."""
+        found = AbsentPackages().leave_out(check_scenarios(self._loaded, InterfaceCatalogue()))
+        return '\n\n'.join(map(render_finding, found)) if has_errors(found) else ''
 
 
 class ScenarioCase(pytest.Item):
@@ -62,8 +71,10 @@ class ScenarioCase(pytest.Item):
         """Run the case in a process of its own.
 
         Raises:
-            CaseFailedError: It failed.
+            CaseFailedError: It failed, or its file has errors.
         """
+        if errors := cast('ScenarioFile', self.parent).errors:
+            raise CaseFailedError(errors)
         captures = self.config.getoption('capture') != 'no'
         request = CaseRequest(_shown(self), self.name, captures=captures)
         result = find_client(self.config).run(request)
@@ -72,7 +83,7 @@ class ScenarioCase(pytest.Item):
             raise CaseFailedError(render_failures(report))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Return our own report for a case that failed."""
+        """Return our own report."""
         if isinstance(excinfo.value, CaseFailedError):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)

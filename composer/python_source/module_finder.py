@@ -82,7 +82,7 @@ class ModuleFinder:
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
         self._located: dict[str, _Location] = {}
-        self._listed: dict[Path, list[str]] = {}
+        self._names: dict[Path, frozenset[str]] = {}
         self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
 
@@ -132,10 +132,7 @@ class ModuleFinder:
         if not located.missing:
             return None
         *done, part = located.missing.split('.')
-        for folder in located.folders:
-            if folder not in self._listed:
-                self._listed[folder] = _list_modules(folder)
-        known = {name for folder in located.folders for name in self._listed[folder]}
+        known = {name for folder in located.folders for name in self._list_modules(folder)}
         near = find_nearest(part, known)
         nearest = '.'.join([*done, near]) if near else None
         return MissingModule(located.missing, nearest, self._find_hiding(done, part))
@@ -149,7 +146,7 @@ class ModuleFinder:
         """Return whether a module, or the package that it is in, is not an installed one."""
         top = name.partition('.')[0]
         if top not in self._is_own:
-            file, folders = _locate(top, self._roots)
+            file, folders = self._locate_part(top, self._roots)
             is_built = file is None and top in self._interfaces
             found = [] if is_built else [*([file] if file else []), *folders[:1]]
             # Python asks no folder for these, whatever is there.
@@ -176,7 +173,7 @@ class ModuleFinder:
         done: list[str] = []
         file: Path | None = None
         for part in name.split('.'):
-            file, inner = _locate(part, folders)
+            file, inner = self._locate_part(part, folders)
             if file is None and not inner and not done:
                 file, inner = _locate_with_importers(part)
             done.append(part)
@@ -189,35 +186,42 @@ class ModuleFinder:
         """Return the `__init__.py` without which a module would be found in another folder."""
         file = self._locate('.'.join(done)).file if done else None
         inside = Path(*done, f'{part}.py')
-        is_elsewhere = file is not None and any(_is_there(root / inside) for root in self._roots)
-        return file if is_elsewhere else None
+        if file is None or not any(os.path.isfile(root / inside) for root in self._roots):
+            return None
+        return file
 
+    def _locate_part(self, part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
+        """Return the file of a module or package, and the folders of its modules.
 
-def _locate(part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
-    """Return the file of a module or package, and the folders of its modules.
+        As in Python's path finder, each folder is listed once, the first regular package or module
+        wins, and folders without an `__init__.py` form one namespace package.
+        """
+        portions: list[Path] = []
+        for folder in folders:
+            names = self._list_names(folder)
+            package = folder / part
+            if part in names and os.path.isfile(package / '__init__.py'):
+                return package / '__init__.py', [package]
+            for suffix in ('.py', *EXTENSION_SUFFIXES):
+                name = f'{part}{suffix}'
+                if name in names and os.path.isfile(folder / name):
+                    return folder / name, []
+            if part in names and os.path.isdir(package):
+                portions.append(package)
+        return None, portions
 
-    As in Python's path finder, the first regular package or module wins, and folders without an
-    `__init__.py` form one namespace package.
-    """
-    portions: list[Path] = []
-    for folder in folders:
-        package = folder / part
-        if _is_there(package / '__init__.py'):
-            return package / '__init__.py', [package]
-        for suffix in ('.py', *EXTENSION_SUFFIXES):
-            if _is_there(module := folder / f'{part}{suffix}'):
-                return module, []
-        if _is_there(package, is_folder=True):
-            portions.append(package)
-    return None, portions
+    def _list_names(self, folder: Path) -> frozenset[str]:
+        if folder not in self._names:
+            try:
+                self._names[folder] = frozenset(os.listdir(folder))  # noqa: PTH208 - fast
+            except OSError:
+                self._names[folder] = frozenset()
+        return self._names[folder]
 
-
-def _is_there(path: Path, *, is_folder: bool = False) -> bool:
-    try:
-        return path.is_dir() if is_folder else path.is_file()
-    except OSError:
-        # The name is too long, or the folder cannot be searched.
-        return False
+    def _list_modules(self, folder: Path) -> list[str]:
+        paths = [folder / name for name in self._list_names(folder)]
+        names = [path.stem for path in paths if path.suffix == '.py' or os.path.isdir(path)]
+        return [name for name in names if name.isidentifier()]
 
 
 def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
@@ -230,12 +234,3 @@ def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
         return None, []
     file = Path(spec.origin) if spec.origin else None
     return file, [Path(entry) for entry in spec.submodule_search_locations or ()]
-
-
-def _list_modules(folder: Path) -> list[str]:
-    try:
-        entries = list(folder.iterdir())
-    except OSError:
-        return []
-    names = [entry.stem for entry in entries if entry.suffix == '.py' or entry.is_dir()]
-    return [name for name in names if name.isidentifier()]

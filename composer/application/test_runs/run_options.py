@@ -9,6 +9,9 @@ from composer.records import record
 if TYPE_CHECKING:
     from pathlib import Path
 
+DEFAULT_PATTERN = 'tests/**/*.scenario.yaml'
+"""Of the files that run without a word."""
+
 
 @record
 class RunOptions:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from composer.application.file_selection import match_pattern, walk_yaml_files
+from composer.application.test_runs.run_options import DEFAULT_PATTERN
 from composer.errors import UsageError
 from composer.records import record
 from composer.spelling import suggest
@@ -15,7 +16,6 @@ from composer.spelling import suggest
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-DEFAULT_PATTERN = 'tests/**/*.scenario.yaml'
 SUFFIXES = ('.scenario.yaml', '.scenario.yml')
 _SEPARATOR = '::'
 

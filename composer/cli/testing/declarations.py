@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN
+from composer.application.test_runs.run_options import DEFAULT_PATTERN
 from composer.cli.common.argument_types import takes_format, takes_words
 
 FORMATS = ('text', 'json', 'github')

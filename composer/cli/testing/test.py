@@ -13,7 +13,8 @@ from composer import signals
 from composer.application.output import show_findings, wants_colour, write_file
 from composer.application.test_runs.case_runs import CaseRuns, plan_cases
 from composer.application.test_runs.name_expressions import parse_name_expression
-from composer.application.test_runs.scenario_selection import DEFAULT_PATTERN, select_scenarios
+from composer.application.test_runs.run_options import DEFAULT_PATTERN
+from composer.application.test_runs.scenario_selection import select_scenarios
 from composer.errors import ExitCode
 from composer.reports import render_report
 from composer.reports.report import Report
