@@ -10,7 +10,7 @@ from composer.simulation.trace import render_event
 
 pytestmark = pytest.mark.ros
 
-SYSTEMS = 4
+SYSTEMS = 2
 CODE = """
 import random
 import threading

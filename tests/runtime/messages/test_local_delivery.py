@@ -63,7 +63,7 @@ def outsider(domain_id):
 
 
 @pytest.mark.parametrize(
-    'seeds', [range(1, 4), pytest.param(range(4, 16), marks=pytest.mark.long)], ids=str
+    'seeds', [range(1, 4), pytest.param(range(4, 8), marks=pytest.mark.long)], ids=str
 )
 def test_both_ways_deliver_and_drop_the_same(tmp_path, outsider, seeds):
     handed_over = sum(compare(create_scenario(seed), tmp_path, outsider) for seed in seeds)

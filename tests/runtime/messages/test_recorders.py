@@ -17,7 +17,7 @@ from tests.runtime.messages.recorders import playing
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.parametrize(('seed', 'turns'), [(1, 2), pytest.param(2, 30, marks=pytest.mark.long)])
+@pytest.mark.parametrize(('seed', 'turns'), [(1, 2), pytest.param(2, 12, marks=pytest.mark.long)])
 def test_recorders_that_come_and_go_disturb_nobody(tmp_path, domain_id, seed, turns):
     with playing(tmp_path, seed, domain_id) as game:
         for _ in range(turns):

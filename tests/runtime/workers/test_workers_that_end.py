@@ -90,18 +90,16 @@ def test_a_worker_that_is_not_started_again(compose, rules, how, line, code):
 
 
 def test_whichever_process_is_killed_nothing_is_left(compose):
-    child = compose(system(NODES), CODE)
-    child.wait_until_ready()
-    count = len([child.pid, *descendants(child.pid)])
-    child.stop()
-    for index in range(count):
+    killed, everyone = 0, [0]
+    while killed < len(everyone):
         child = compose(system(NODES), CODE)
         child.wait_until_ready()
         everyone = [child.pid, *sorted(descendants(child.pid))]
-        os.kill(everyone[index], signal.SIGKILL)
-        if index:
+        os.kill(everyone[killed], signal.SIGKILL)
+        if killed:
             child.send(signal.SIGINT)
         wait_until_gone(everyone)
+        killed += 1
 
 
 def test_all_processes_but_one_are_killed_and_nothing_is_left(compose):
