@@ -83,6 +83,7 @@ class ModuleFinder:
         self._found: dict[str, ModuleSource | MissingModule] = {}
         self._located: dict[str, _Location] = {}
         self._names: dict[Path, frozenset[str]] = {}
+        self._modules: dict[Path, list[str]] = {}
         self._is_own: dict[str, bool] = {}
         self._tokens_left = MAX_TOKENS_OF_MODULES
 
@@ -219,9 +220,11 @@ class ModuleFinder:
         return self._names[folder]
 
     def _list_modules(self, folder: Path) -> list[str]:
-        paths = [folder / name for name in self._list_names(folder)]
-        names = [path.stem for path in paths if path.suffix == '.py' or os.path.isdir(path)]
-        return [name for name in names if name.isidentifier()]
+        if folder not in self._modules:
+            paths = [folder / name for name in self._list_names(folder)]
+            names = [path.stem for path in paths if path.suffix == '.py' or os.path.isdir(path)]
+            self._modules[folder] = [name for name in names if name.isidentifier()]
+        return self._modules[folder]
 
 
 def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
