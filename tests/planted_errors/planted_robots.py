@@ -17,6 +17,8 @@ ROWS = [
     if not line.startswith('#')
 ]
 
+MISSED = 'missed: '
+
 
 def find_planted(folder, file, edit):
     """Return the line of a planted error, and the rules of what is found in it and elsewhere."""
@@ -34,12 +36,13 @@ def find_planted(folder, file, edit):
     return here, [each.rule for each in findings if each.rule not in here]
 
 
-def measure_behaviours(folder):
-    """Return the rows whose errors are not found in their lines, by their rules."""
+def measure_behaviours(folder, rows=ROWS):
+    """Return what of the rows is not found in its line: file, edit, rule, and what is found."""
     missed = []
     with contextlib.chdir(folder):
-        for row in ROWS:
-            here, elsewhere = find_planted(folder, *row[:2])
-            if row[2] not in here:
-                missed.append((*row, here, elsewhere))
+        for file, edit, told in rows:
+            here, elsewhere = find_planted(folder, file, edit)
+            rule = told.removeprefix(MISSED)
+            if rule not in here:
+                missed.append((file, edit, rule, here, elsewhere))
     return missed
