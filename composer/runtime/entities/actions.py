@@ -332,18 +332,16 @@ class _Execution:
             goal.publish_feedback(feedback)
 
     def _must_end(self, goal: Any) -> bool:
-        return (
-            goal.is_cancel_requested
-            or self.is_ending()
-            or self._queue.aborts
-            or self._queue.is_superseded(goal)
-        )
+        return goal.is_cancel_requested or self._must_abort(goal)
+
+    def _must_abort(self, goal: Any) -> bool:
+        return self.is_ending() or self._queue.aborts or self._queue.is_superseded(goal)
 
     def _end_early(self, goal: Any) -> bool:
         """Give a goal that may not go on its final state; return whether it was such a one."""
         if goal.is_cancel_requested:
             goal.canceled()
-        elif self._must_end(goal):
+        elif self._must_abort(goal):
             goal.abort()
         else:
             return False

@@ -28,7 +28,20 @@ STATUS = {
 CODE = """
 import time
 
+from action_msgs.msg import GoalStatus
 from composer import AbortedError
+from rclpy.action.server import GoalEvent, ServerGoalHandle
+
+look = ServerGoalHandle.is_cancel_requested.fget
+
+@property
+def look_just_before_the_request(goal):
+    seen = look(goal)
+    if goal.request.order == 777 and goal.status == GoalStatus.STATUS_EXECUTING:
+        goal._update_state(GoalEvent.CANCEL_GOAL)
+    return seen
+
+ServerGoalHandle.is_cancel_requested = look_just_before_the_request
 
 def plain(node, goal):
     return [goal.order]
@@ -265,6 +278,12 @@ def test_a_cancelled_goal_ends_at_its_next_yield_with_its_finally(child, connect
     assert client.cancel(handle) == 1
     assert client.end(handle) == ('canceled', [])
     child.wait_for_line(f'[server]: cleaned up {order}')
+
+
+@pytest.mark.parametrize('name', ['forever', 'forever_async'])
+def test_a_goal_is_cancelled_by_a_request_that_comes_after_any_look_for_one(connect, name):
+    client = connect(name)
+    assert client.end(client.begin(777)) == ('canceled', [])
 
 
 @pytest.mark.parametrize(
