@@ -35,7 +35,8 @@ def measure(side: str, _size: int, seconds: float) -> dict[str, float]:
     """
     timer = {'period': 0.1, 'behaviour': f'{__name__}:talk', 'with': {'seconds': seconds}}
     publisher = {'topic': 'words', 'type': 'std_msgs/msg/String'}
-    hearer = {'topic': 'words', 'type': 'std_msgs/msg/String', 'behaviour': f'{__name__}:hear'}
+    # A burst waits in the queue of who hears it: each message has its callback.
+    hearer = {**publisher, 'behaviour': f'{__name__}:hear', 'qos': {'depth': 10 * _BURST}}
     nodes = {
         'talker': {'publishers': {'words': publisher}, 'timers': {'talk': timer}},
         'hearer': {'subscriptions': {'words': hearer}},

@@ -5,7 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 import threading
+from collections import defaultdict
 from contextlib import contextmanager, suppress
+from operator import itemgetter
 from threading import get_ident
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
@@ -30,6 +32,10 @@ MOST_EVENTS: Final = 500_000
 COROUTINE: Final = 'coroutine'
 MARKS: Final = 'marks'
 _FIELDS: Final = 7
+_BEGUN_NS: Final = 4
+# What is noted of messages, with the queue as its node and the message's identity as its name.
+_HANDED_OVER: Final = 'handed over'
+_PUSHED_OUT: Final = 'pushed out'
 
 
 class TracePart(NamedTuple):
@@ -51,25 +57,35 @@ class TracePart(NamedTuple):
 class Tracer:
     """Notes what happens in this process, from `turn_on` until `take`.
 
+    As little as possible is done where something happens. What belongs together, as a message
+    that is handed over and the callback that takes it, `take` finds out.
+
     Attributes:
         is_on: Whether it does.
+        now_ns: Returns the time.
+        add: Notes an event.
     """
 
     def __init__(self) -> None:
         self.is_on = False
-        self._begun_ns = 0
+        self._begun_ns = self._last_ns = 0
+        self.now_ns = monotonic_ns
         self._clear()
 
     def _clear(self) -> None:
         # Their fields one after the other: so many tuples would keep the garbage collector busy.
         self._fields: list[Any] = []
         self._lost = 0
-        self._last_ns = 0
-        self._arrows = itertools.count(1)
-        # What is handed over and not run yet, by the identity of the message.
-        self._waiting: dict[int, list[tuple[int, TracedInbox]]] = {}
-        # When each thread published last.
-        self._publications: dict[int, int] = {}
+        self.add = self._create_add(self._fields, MOST_EVENTS * _FIELDS)
+
+    def _create_add(self, fields: list[Any], most: int) -> Callable[[tuple[Any, ...]], None]:
+        def add(event: tuple[Any, ...]) -> None:
+            if len(fields) < most:
+                fields.extend(event)
+            else:
+                self._lost += 1
+
+        return add
 
     def turn_on(self, begun_ns: int | None = None) -> None:
         """Begin, or begin anew.
@@ -78,8 +94,14 @@ class Tracer:
             begun_ns: When virtual time begins; `None` for now.
         """
         self._clear()
-        self._begun_ns = self.now_ns() if begun_ns is None else begun_ns
+        self.now_ns = monotonic_ns if begun_ns is None else self._next_ns
+        self._begun_ns = self._last_ns = monotonic_ns() if begun_ns is None else begun_ns
         self.is_on = True
+
+    def _next_ns(self) -> int:
+        """Return the time; it is never the same twice, though virtual time stands still."""
+        self._last_ns = max(monotonic_ns(), self._last_ns + 1)
+        return self._last_ns
 
     def take(self, running: Iterable[tuple[str, RunningCalls]]) -> TracePart:
         """Turn off, and return what was noted.
@@ -89,12 +111,8 @@ class Tracer:
         """
         self.is_on = False
         ended_ns, fields = self.now_ns(), iter(self._fields)
-        events: list[TraceEvent] = [
-            (kind, node, track, str(name), begun_ns, end_ns, value)
-            for kind, node, track, name, begun_ns, end_ns, value in zip(
-                *[fields] * _FIELDS, strict=True
-            )
-        ]
+        noted = sorted(zip(*[fields] * _FIELDS, strict=True), key=itemgetter(_BEGUN_NS))
+        events = list(_find_arrows(noted))
         for node, calls in running:
             for call in calls.calls():
                 track = COROUTINE if call.thread is None else call.thread
@@ -106,29 +124,13 @@ class Tracer:
         self._clear()
         return part
 
-    def now_ns(self) -> int:
-        """Return the time; it is never the same twice, though virtual time stands still."""
-        now_ns = monotonic_ns()
-        if now_ns <= self._last_ns:
-            now_ns = self._last_ns + 1
-        self._last_ns = now_ns
-        return now_ns
-
     def begin(self, arguments: tuple[Any, ...] = ()) -> tuple[int, int]:
         """Return what `end` is to be told of what begins now.
 
         Args:
             arguments: Those of a callback: a message that was handed over has an arrow.
         """
-        now_ns, arrow = self.now_ns(), 0
-        if arguments and (waiting := self._waiting.pop(id(arguments[0]), None)):
-            for _, inbox in waiting:
-                self._add(('queue', *inbox.place, now_ns, now_ns, len(inbox.messages)))
-            arrow, _ = waiting.pop()
-            if waiting:
-                # Others share the message.
-                self._waiting[id(arguments[0])] = waiting
-        return now_ns, arrow
+        return self.now_ns(), id(arguments[0]) if arguments else 0
 
     def end(
         self, kind: EventKind, node: str, name: object, begun: tuple[int, int], track: str = ''
@@ -139,10 +141,10 @@ class Tracer:
             begun: See `begin`.
             track: Of what holds no thread.
         """
-        begun_ns, arrow = begun
+        begun_ns, message = begun
         if begun_ns >= self._begun_ns:
             place = track or get_ident()
-            self._add((kind, node, place, name, begun_ns, self.now_ns(), arrow))
+            self.add((kind, node, place, name, begun_ns, self.now_ns(), message))
 
     @contextmanager
     def waiting(self, node: str, what: str, track: str = '') -> Iterator[None]:
@@ -157,48 +159,50 @@ class Tracer:
     def note(self, kind: EventKind, node: str, name: str, value: int) -> None:
         """Note a length, or that something was dropped or late."""
         now_ns = self.now_ns()
-        self._add((kind, node, MARKS, name, now_ns, now_ns, value))
-
-    def _add(self, event: tuple[Any, ...]) -> None:
-        if len(self._fields) < MOST_EVENTS * _FIELDS:
-            self._fields += event
-        else:
-            self._lost += len(event) // _FIELDS
+        self.add((kind, node, MARKS, name, now_ns, now_ns, value))
 
     def create_tap(self, node: str, topic: str) -> Callable[[Any], None]:
         """Return what notes a message that is published."""
 
         def tap(_message: Any) -> None:
-            thread, now_ns = get_ident(), self.now_ns()
-            self._publications[thread] = now_ns
-            self._add(('publish', node, thread, topic, now_ns, now_ns, 0))
+            now_ns = self.now_ns()
+            self.add(('publish', node, get_ident(), topic, now_ns, now_ns, 0))
 
         return tap
 
-    def hand_over(self, message: Any, inbox: TracedInbox) -> None:
-        """Note that what this thread publishes comes into a queue now."""
-        thread = get_ident()
-        begun_ns = self._publications.get(thread)
-        if not self.is_on or begun_ns is None:
-            return
-        messages, (node, track, name) = inbox.messages, inbox.place
-        now_ns, arrow, length = self.now_ns(), next(self._arrows), len(messages) + 1
-        if length > inbox.most:
-            length -= 1
-            with suppress(IndexError):  # Another thread was faster.
-                self._waiting.pop(id(messages[0]), None)
-            self._add(('dropped', node, track, name, now_ns, now_ns, 1))
-        if (waiting := self._waiting.get(id(message))) is None:
-            self._waiting[id(message)] = [(arrow, inbox)]
+
+def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
+    """Yield events for what was noted, in the order in which it began."""
+    arrows = itertools.count(1)
+    # When each thread published last.
+    publications: dict[int, int] = {}
+    # What is handed over and not run yet, by the identity of the message: others may share it.
+    waiting: defaultdict[int, dict[tuple[str, str], int]] = defaultdict(dict)
+    lengths: dict[tuple[str, str], int] = {}
+    for kind, node, track, name, begun_ns, ended_ns, value in noted:
+        if kind == _PUSHED_OUT:
+            queue = node.place
+            waiting[name].pop(queue, None)
+            yield 'dropped', queue[0], MARKS, queue[1], begun_ns, begun_ns, 1
+        elif kind == _HANDED_OVER:
+            queue = node.place
+            sent_ns = publications.get(track)
+            if sent_ns is not None:
+                lengths[queue] = value
+                waiting[name][queue] = arrow = next(arrows)
+                yield 'arrow', queue[0], track, queue[1], sent_ns, begun_ns, arrow
+                yield 'queue', queue[0], MARKS, queue[1], begun_ns, begun_ns, value
+        elif kind == 'callback':
+            queue = node, str(name)
+            arrow = waiting[value].pop(queue, 0) if value in waiting else 0
+            if arrow:
+                lengths[queue] = max(0, lengths[queue] - 1)
+                yield 'queue', node, MARKS, queue[1], begun_ns, begun_ns, lengths[queue]
+            yield kind, node, track, queue[1], begun_ns, ended_ns, arrow
         else:
-            waiting.append((arrow, inbox))
-        # Two events at once.
-        self._add(
-            (
-                *('arrow', node, thread, name, begun_ns, now_ns, arrow),
-                *('queue', node, track, name, now_ns, now_ns, length),
-            )
-        )
+            if kind == 'publish':
+                publications[track] = begun_ns
+            yield kind, node, track, str(name), begun_ns, ended_ns, value
 
 
 class TracedInbox:
@@ -210,18 +214,25 @@ class TracedInbox:
     Attributes:
         messages: Those of the queue.
         most: How many it holds.
-        place: Node, track and name of its length.
+        place: Its node and the name of its length.
     """
 
     def __init__(self, node: Any, what: str, inbox: Inbox) -> None:
         self.messages = inbox.messages
         self.most = math.inf if inbox.depth is None else inbox.depth
-        self.place = node.get_fully_qualified_name(), MARKS, what
+        self.place = node.get_fully_qualified_name(), what
         self._put = inbox.put
 
     def put(self, message: Any) -> None:
         """See `Inbox`."""
-        tracer.hand_over(message, self)
+        if tracer.is_on:
+            length, now_ns = len(self.messages), tracer.now_ns()
+            if length >= self.most:
+                with suppress(IndexError):  # Another thread was faster.
+                    pushed_out = id(self.messages[0])
+                    tracer.add((_PUSHED_OUT, self, 0, pushed_out, now_ns, now_ns, 0))
+                length -= 1
+            tracer.add((_HANDED_OVER, self, get_ident(), id(message), now_ns, now_ns, length + 1))
         self._put(message)
 
 
