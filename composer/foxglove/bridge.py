@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import foxglove
 from foxglove.websocket import Capability
 from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from websockets import Subprotocol
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
@@ -38,12 +39,13 @@ if TYPE_CHECKING:
     from rclpy.context import Context
 
     from composer.foxglove import BridgeOptions
-    from composer.recordings.recorder import Entry, Log
+    from composer.recordings.recorder import Log
     from composer.runtime.messages.local_delivery import LocalTopics
 
 _LOOK_SEC: Final = 1.0
 _STOP_SEC: Final = 2.0
 _BURST_SEC: Final = 0.02
+_ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
 # A client that takes nothing for so long is disconnected.
@@ -71,19 +73,20 @@ class FoxgloveBridge(GraphAccess):
         log: Gets the address, and what keeps a topic from being shown.
 
     Attributes:
-        queue: Takes messages, and sends them soon.
-        room: As the next one, for who asks a recorder.
-        lost: Always 0: the server drops what a client does not take.
+        queue: Takes messages, and they are sent soon.
+        serializes: Messages in bursts, which costs less than one by one where they are published.
+        room: How many messages may wait to be sent.
+        lost: How many did not, as there was no room.
 
     Raises:
         StartError: The port is taken.
     """
 
-    room, lost = 1, 0
+    serializes, room, lost = True, _ROOM, 0
 
     def __init__(self, options: BridgeOptions, name: str, log: Log) -> None:
         super().__init__(allows_changes=options.allows_changes)
-        self.queue: Any = self
+        self.queue: deque[Any] = deque()
         self._log = log
         self._address = _LOOPBACK if options.address in _ANY else options.address
         self._sink = foxglove.Context()
@@ -96,8 +99,7 @@ class FoxgloveBridge(GraphAccess):
         # What the threads of the server tell; they may hold its locks.
         self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._ended = threading.Event()
-        self._entries: deque[Any] = deque()
-        self._has_entries = threading.Event()
+        self._is_wanted = threading.Event()
         changing = [Capability.ClientPublish, Capability.Services]
         reading = [Capability.ConnectionGraph, Capability.Parameters]
         try:
@@ -140,7 +142,7 @@ class FoxgloveBridge(GraphAccess):
             return
         self._ended.set()
         self._told.put('')
-        self._has_entries.set()
+        self._is_wanted.set()
         if self._thread.ident is not None:
             self._thread.join(_STOP_SEC)
             self._recorder.stop()
@@ -157,28 +159,19 @@ class FoxgloveBridge(GraphAccess):
 
     # As a recorder, and as its patterns
 
-    def __len__(self) -> int:
-        return 0
-
-    def append(self, entry: Entry) -> None:
-        """Have a message sent to those who subscribe to its channel."""
-        self._entries.append(entry)
-        if not self._has_entries.is_set():
-            self._has_entries.set()
-
     def _send(self) -> None:
-        """Send what comes in bursts: to wake the server for each message costs far more."""
-        entries = self._entries
-        while not self._ended.is_set():
-            self._has_entries.wait()
-            self._has_entries.clear()
+        """Send what comes in bursts: to wake a thread for each message costs far more."""
+        entries, serialize = self.queue, _rclpy.rclpy_serialize
+        while not self._ended.wait(_BURST_SEC):
+            self._is_wanted.wait()
             for _ in range(len(entries)):
                 channel, _, published_ns, data = entries.popleft()
                 try:
+                    if type(data) is not bytes:
+                        data = serialize(data, type(data))
                     channel.base.log(data, log_time=published_ns)
                 except Exception as error:  # noqa: BLE001 - a message costs no more than itself
                     self._warn_once(f"a message of '{channel.topic}' is left out: {error}")
-            self._ended.wait(_BURST_SEC)
 
     def has(self, topic: str) -> bool:
         """Return whether a client subscribes to a topic."""
@@ -263,6 +256,7 @@ class FoxgloveBridge(GraphAccess):
     def on_subscribe(self, _client: Client, channel: ChannelView) -> None:
         """Have the topic listened to; anew, if it is, as a latched message is then sent again."""
         self._wanted[channel.topic] += 1
+        self._is_wanted.set()
         self._told.put(channel.topic)
 
     def on_unsubscribe(self, _client: Client, channel: ChannelView) -> None:
@@ -270,6 +264,8 @@ class FoxgloveBridge(GraphAccess):
         self._wanted[channel.topic] -= 1
         if not self._wanted[channel.topic]:
             self._told.put(channel.topic)
+        if not self._wanted.total():
+            self._is_wanted.clear()
 
     def on_connection_graph_subscribe(self) -> None:
         """Show the graph, soon and when it changes."""

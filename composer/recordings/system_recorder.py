@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         LocalPublisher,
         LocalSubscription,
         LocalTopics,
+        Tap,
     )
 
 _NODE_NAME: Final = '_composer_recorder'
@@ -123,9 +124,7 @@ class SystemRecorder:
         seen = self._graph.topics if self._graph else ()
         self.sink.finish(self._patterns.describe_unused(seen))
 
-    def _find_tap(
-        self, own: _OwnPublishers, publisher: LocalPublisher
-    ) -> Callable[[Any], None] | None:
+    def _find_tap(self, own: _OwnPublishers, publisher: LocalPublisher) -> Tap | None:
         ros = publisher.ros
         topic = ros.topic_name
         if not self._patterns.has(topic) or (self._is_late and is_latched(ros)):
@@ -141,16 +140,18 @@ def create_tap(
     channel: Channel,
     message_class: type,
     report: Callable[[str], object],
-) -> Callable[[Any], None]:
+) -> Tap:
     """Return what records a message of a publisher, in the thread that publishes it."""
     serialize, queue, append = _rclpy.rclpy_serialize, recorder.queue, recorder.queue.append
+    serializes = recorder.serializes
 
-    def tap(message: Any) -> None:
+    def tap(message: Any, may_keep: bool) -> None:  # noqa: FBT001 - as `Tap`
         if len(queue) >= recorder.room:
             recorder.lost += 1
             return
         try:
-            data = serialize(message, message_class)
+            keeps = may_keep and serializes
+            data = message if keeps else serialize(message, message_class)
         except Exception as error:  # noqa: BLE001 - whoever publishes it is told by rclpy
             report(f"a message of '{channel.topic}' is left out: {error}")
             return

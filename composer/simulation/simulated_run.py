@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
 
     from composer.language.specs import ConditionSpec, NodeSpec, SystemSpec
-    from composer.runtime.messages.local_delivery import LocalPublisher
+    from composer.runtime.messages.local_delivery import LocalPublisher, Tap
     from composer.runtime.nodes.live_node import LiveNode
     from composer.runtime.nodes.system_handle import Observe
     from composer.runtime.rewiring.reading import Reading
@@ -84,7 +84,7 @@ class SimulatedRun(System):
         super()._create_nodes()
         self._on_created()
 
-    def _tap(self, publisher: LocalPublisher) -> Callable[[Any], bool]:
+    def _tap(self, publisher: LocalPublisher) -> Tap:
         observe: Any = self._handle.observe
         node = publisher.node.get_fully_qualified_name()
         topic, copy = publisher.ros.topic_name, ownership_of(publisher.ros.msg_type).copy
@@ -92,7 +92,7 @@ class SimulatedRun(System):
 
         deliver = partial(publisher.deliver, is_held=False)
 
-        def tap(message: Any) -> bool:
+        def tap(message: Any, _may_keep: bool) -> bool:  # noqa: FBT001 - as `Tap`
             observe('message', node, topic, copy(message))
             return self.faults.take(topic, partial(copy, message), deliver)
 

@@ -15,7 +15,7 @@ pytest.importorskip('foxglove')
 pytest.importorskip('websockets')
 
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Int64, String
+from std_msgs.msg import Int64, Int64MultiArray, String
 from std_srvs.srv import SetBool
 from websockets.sync.client import connect
 
@@ -38,7 +38,10 @@ nodes:
       count: {type: std_msgs/msg/Int64}
       map: {type: std_msgs/msg/String, qos: {durability: transient_local}}
       big: {type: std_msgs/msg/String}
+      kept: {type: std_msgs/msg/Int64}
+      values: {type: std_msgs/msg/Int64MultiArray}
     timers:
+      change: {rate: 20, behaviour: parts:change}
       tick: {rate: 50, behaviour: parts:tick, publish: count, group: own}
       grow: {rate: 10, behaviour: parts:grow, publish: big}
     on_start: parts:draw
@@ -53,9 +56,25 @@ nodes:
     timers: {tick: {rate: 20, behaviour: parts:tick, publish: far}}
 """
 CODE = """
+from std_msgs.msg import Int64, Int64MultiArray
+
 def tick(node):
     node.state.count = getattr(node.state, 'count', 0) + 1
     return node.state.count
+
+kept, values = Int64(), []
+
+def change(node):
+    for _ in range(3):
+        kept.data += 1
+        node.publish('kept', kept)
+        node.publish('values', of_values())
+        values[-1][0] = -1
+
+def of_values():
+    message = Int64MultiArray(data=[kept.data])
+    values.append(message.data)
+    return message
 
 def grow(node):
     return 'x' * 1_000_000
@@ -174,8 +193,15 @@ def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(start, peer, c
         one.subscribe('/map', 2)
         one.subscribe('/far', 3)
         one.subscribe('/outside', 4)
+        one.subscribe('/kept', 5)
+        one.subscribe('/values', 6)
         numbers = [message.data for message in one.messages(1, Int64, count=20)]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        # What is changed after it was published is as it was then.
+        for number, message_class in ((5, Int64), (6, Int64MultiArray)):
+            came = [message.data for message in one.messages(number, message_class, count=9)]
+            numbers = [each if isinstance(each, int) else each[0] for each in came]
+            assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         assert one.messages(2, String)[0].data == 'the map'
         assert len(one.messages(3, Int64, count=5)) >= 5
         wait_for(sender.get_subscription_count, 'the bridge')
@@ -214,8 +240,9 @@ def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog)
         channel = bridge.open_channel('/time', Int64)
         # The clock of a publisher may be before 1970.
         for stamp_ns in (-1, -2, 1):
-            bridge.append((channel, 0, stamp_ns, serialize_message(Int64(data=stamp_ns))))
-        assert [message.data for message in one.messages(1, Int64)] == [1]
+            bridge.queue.append((channel, 0, stamp_ns, serialize_message(Int64(data=stamp_ns))))
+        bridge.queue.append((channel, 0, 2, Int64(data=2)))
+        assert [message.data for message in one.messages(1, Int64, 2)] == [1, 2]
     [warning] = [each.message for each in caplog.records if each.levelname == 'WARNING']
     assert warning.startswith("a message of '/time' is left out: ")
 

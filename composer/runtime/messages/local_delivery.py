@@ -56,8 +56,9 @@ class LocalPublisher:
         is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
-        tap: Called with each message before it goes anywhere; it must not change or keep it. What
-            it returns true for goes nowhere.
+        tap: Called with each message before it goes anywhere, and with whether it may keep the
+            message, which nobody changes then; it must not change it. What it returns true for
+            goes nowhere.
         published: How many messages it was given.
     """
 
@@ -66,7 +67,7 @@ class LocalPublisher:
         self.ros = ros
         self.is_local = is_local
         self.reason = ''
-        self.tap: Callable[[Any], object] | None = None
+        self.tap: Tap | None = None
         self.published = 0
         self._own_reason = why_sent(ros.qos_profile)
         self._always_sends = _always_sends(ros.qos_profile)
@@ -142,8 +143,13 @@ class LocalPublisher:
         """
         self.published += 1
         # A client that leaves takes it away, in another thread.
-        if (tap := self.tap) is None or not tap(message):
-            self.deliver(message, is_held=is_held)
+        if (tap := self.tap) is not None:
+            may_keep = not is_held and not self._inboxes
+            if may_keep:
+                message = self._ownership.take(message, is_held=False)
+            if tap(message, may_keep):
+                return
+        self.deliver(message, is_held=is_held)
 
     def deliver(self, message: Any, *, is_held: bool) -> None:
         """Hand over or send a message that was published."""
@@ -208,7 +214,8 @@ class LocalPublisher:
             inbox.put(message)
 
 
-FindTap: TypeAlias = 'Callable[[LocalPublisher], Callable[[Any], object] | None]'
+Tap: TypeAlias = 'Callable[[Any, bool], object]'
+FindTap: TypeAlias = 'Callable[[LocalPublisher], Tap | None]'
 _Receiver: TypeAlias = 'Inbox | TracedInbox'
 
 
@@ -315,9 +322,9 @@ class LocalTopics:
             name = publisher.node.get_fully_qualified_name()
             taps.append(tracer.create_tap(name, publisher.ros.topic_name))
 
-        def tell_all(message: Any) -> bool:
+        def tell_all(message: Any, may_keep: bool) -> bool:  # noqa: FBT001 - as `Tap`
             # All are told.
-            return sum(bool(tap(message)) for tap in taps) > 0
+            return sum(bool(tap(message, may_keep)) for tap in taps) > 0
 
         publisher.tap = (tell_all if taps[1:] else taps[0]) if taps else None
         publisher.follow_tracer()
