@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from composer.executor.sources.inbox import Inbox
     from composer.runtime.behaviours.running_calls import RunningCalls
-    from composer.runtime.messages.local_delivery import Tap
 
 EventKind: TypeAlias = Literal[
     'callback', 'publish', 'arrow', 'call', 'wait', 'goal', 'queue', 'dropped', 'late'
@@ -162,10 +161,10 @@ class Tracer:
         now_ns = self.now_ns()
         self.add((kind, node, MARKS, name, now_ns, now_ns, value))
 
-    def create_tap(self, node: str, topic: str) -> Tap:
+    def create_tap(self, node: str, topic: str) -> Callable[[Any, bool], None]:
         """Return what notes a message that is published."""
 
-        def tap(_message: Any, _may_keep: bool) -> None:  # noqa: FBT001 - as `Tap`
+        def tap(_message: Any, _may_keep: bool) -> None:  # noqa: FBT001 - a `Tap`
             now_ns = self.now_ns()
             self.add(('publish', node, get_ident(), topic, now_ns, now_ns, 0))
 
