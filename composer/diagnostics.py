@@ -186,9 +186,9 @@ def relative_path(name: str) -> str:
     """Return a path relative to the working folder if it lies in it, with forward slashes."""
     if name.startswith('<'):
         return name
-    path = Path(os.path.abspath(name))  # noqa: PTH100 - `resolve` would follow links
-    folder = Path.cwd()
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
+    # With `pathlib`, thousands of them take a second.
+    folder = os.path.join(os.getcwd(), '')  # noqa: PTH109, PTH118
+    return os.path.abspath(name).removeprefix(folder).replace(os.sep, '/')  # noqa: PTH100
 
 
 def describe_finding(finding: Diagnostic) -> dict[str, Any]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from itertools import groupby, islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from composer.confidential import may_show_lines
 from composer.diagnostics import relative_path
-from composer.records import record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -21,8 +20,7 @@ _NODE = 2
 _MOST_EXCERPTS = 8
 
 
-@record
-class Excerpt:
+class Excerpt(NamedTuple):
     """Successive lines of a file.
 
     Attributes:

@@ -59,7 +59,7 @@ _SMALL, _GREY = 9, '#57606a'
 # Graphviz would look for the best layout of more nodes for minutes: 1,000 that share a topic take
 # four seconds so.
 _MOST_NODES = 150
-_HURRIED = 'splines=line, nslimit=0.5, nslimit1=0.5, mclimit=0.05, '
+_HURRIED = 'splines=line, nslimit=0.1, nslimit1=0.1, mclimit=0.01, '
 _LIMIT_SEC = 120.0
 _WITH_LIBRARY = (
     'import sys, pygraphviz\n'

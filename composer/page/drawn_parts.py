@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import threading
 from collections import defaultdict
-from dataclasses import asdict, replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -136,14 +137,18 @@ class Drawing:
             self._fold.cache_clear()
 
     def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
-        documents = {
-            each: _inlined(render_svg(self._picture, folded, each)) for each in self._directions
-        }
+        with ThreadPoolExecutor() as pool:
+            # Graphviz has another process for it.
+            layouts = {
+                each: pool.submit(render_svg, self._picture, folded, each)
+                for each in self._directions
+            }
+            drawn = arrange_shapes(self._picture, folded)
+            parts = dict(_parts(self._picture, self._code))
+            parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
+            parts |= dict(_bundles(drawn, parts))
+        documents = {each: _inlined(layout.result()) for each, layout in layouts.items()}
         self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
-        drawn = arrange_shapes(self._picture, folded)
-        parts = dict(_parts(self._picture, self._code))
-        parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
-        parts |= dict(_bundles(drawn, parts))
         owners = {index: token for token in reversed(parts) for index in parts[token]['findings']}
         findings = [
             {**describe_finding(finding), 'part': owners.get(index)}
@@ -189,7 +194,7 @@ def _parts(
             {
                 **_part(part.id, part.kind, name, part.facts, [tokens[id_] for id_ in near]),
                 'findings': part.findings,
-                'excerpts': [asdict(each) for each in (*lines, *code.get(part.id, ()))],
+                'excerpts': [each._asdict() for each in (*lines, *code.get(part.id, ()))],
             },
         )
 
@@ -197,11 +202,8 @@ def _parts(
 def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the data of a region; `near` are the ends in it of what crosses its border."""
     members = {shape.token: shape.kind for shape in region.all_shapes()}
-    near = [
-        token
-        for token, part in parts.items()
-        if token[0] == 'e' and len(members.keys() & set(part['near'])) == 1
-    ]
+    ends = dict.fromkeys(end for each in members if each in parts for end in parts[each]['near'])
+    near = [end for end in ends if len(members.keys() & set(parts[end]['near'])) == 1]
     name = region.title.removeprefix(f'{region.kind} ')
     facts = [', '.join(count_kinds(members.values()))]
     return {

@@ -289,7 +289,8 @@ class PageServer:
             return _json({})
         folded = frozenset(request.query_params.getlist('folded'))
         # Graphviz takes a while.
-        return _json(await asyncio.to_thread(drawing.fold, folded), longest=sys.maxsize)
+        drawn = await asyncio.to_thread(drawing.fold, folded)
+        return Response(json.dumps(drawn, separators=(',', ':')), media_type='application/json')
 
     async def _log(self, request: Request) -> Response:
         after = request.query_params.get('after', '0')
