@@ -33,7 +33,8 @@ SUBJECTS = {
     'nobody': Subject('benchmarks.nobody', 1.0),
     'recording': Subject('benchmarks.recording', 4.0),
     'foxglove_bridge': Subject('benchmarks.foxglove_bridge', 6.0),
-    'page': Subject('benchmarks.page', 6.0),
+    # A page that is closed asks each 10 s.
+    'page': Subject('benchmarks.page', 10.0),
     'simulated': Subject('benchmarks.simulated', 5.0),
     'overhead': Subject('benchmarks.message_overhead'),
     'forty': Subject('benchmarks.forty'),

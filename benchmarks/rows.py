@@ -173,7 +173,7 @@ def _foxglove() -> list[Row]:
 
 def _page() -> list[Row]:
     def row(what: str, target: float) -> Row:
-        ours, other = (_side('page', name, 50, 'percent') for name in (what, 'alone'))
+        ours, other = (_side('page', 'system', 50, key) for key in (what, 'alone'))
         title = f'50 nodes at 100 Hz, % of a core for a page that is {what}'
         return Row(title, ours, other, more, '<=', target)
 
