@@ -29,18 +29,23 @@ _domain_offsets = count(os.getpid() * 7)
 _peers = []
 
 
+_PAUSE_SEC = 0.01
+
+
 def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
     """Return the first true result of `condition`; fail after a deadline, or as a peer has.
 
     `what` may be a function: what it returns then shows how it was at the deadline.
     """
-    deadline = time.monotonic() + timeout_sec
+    deadline = (looked := time.monotonic()) + timeout_sec
     while not (result := condition()):
         for peer in _peers:
             peer.check()
         if time.monotonic() > deadline:
             pytest.fail(f'in vain waited for {what() if callable(what) else what}')
-        time.sleep(0.01)
+        # What is dear to look at, as a page, is not looked at all the time.
+        time.sleep(min(max(_PAUSE_SEC, 3 * (time.monotonic() - looked)), 5 * _PAUSE_SEC))
+        looked = time.monotonic()
     return result
 
 
