@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 from threading import get_ident
-from time import thread_time_ns
-from typing import TYPE_CHECKING
+from time import monotonic_ns, thread_time_ns
+from typing import TYPE_CHECKING, Final, Protocol
 
 from composer.runtime.costs.interpreter_waits import InterpreterWaits
 from composer.runtime.costs.thread_clock import read_thread_clock_ns
@@ -13,13 +13,42 @@ from composer.runtime.costs.thread_clock import read_thread_clock_ns
 if TYPE_CHECKING:
     from composer.runtime.costs.interpreter_waits import Waits
 
+_SHORT_NS: Final = 1_000_000
+_READ_NS: Final = 10_000_000
+
+
+class Costs(Protocol):
+    """What a call adds to.
+
+    Attributes:
+        cpu_ns: Time of the processor.
+    """
+
+    cpu_ns: int
+
+
+class _Mark:
+    """What a thread had used when its clock was read last, and when that was.
+
+    Attributes:
+        short: The calls that have ended since, and how long they took.
+    """
+
+    __slots__ = ('read_ns', 'short', 'used_ns')
+
+    def __init__(self, used_ns: int) -> None:
+        self.used_ns = used_ns
+        self.read_ns = monotonic_ns()
+        self.short: list[tuple[Costs, int]] = []
+
 
 class CallMeter:
     """Measures the processor time of calls.
 
     A call is given all that its thread has used since its last call ended: so what it costs to
     take a message counts, too. To read the clock of a thread takes as long as all else that is
-    measured of a call.
+    measured of a call, so short calls in quick succession share what they have used, by how long
+    they took.
 
     Attributes:
         is_on: Whether it measures.
@@ -27,7 +56,7 @@ class CallMeter:
 
     def __init__(self) -> None:
         self.is_on = False
-        self._marks: dict[int, int] = {}
+        self._marks: dict[int, _Mark] = {}
         self._waits: InterpreterWaits | None = None
 
     def turn(self, *, on: bool) -> None:
@@ -36,7 +65,7 @@ class CallMeter:
             return
         if on:
             self._marks = {
-                each.ident: read_thread_clock_ns(each.native_id) or 0
+                each.ident: _Mark(read_thread_clock_ns(each.native_id) or 0)
                 for each in threading.enumerate()
                 if each.ident is not None and each.native_id is not None
             }
@@ -46,31 +75,46 @@ class CallMeter:
             self._waits.stop()
         self.is_on = on
 
-    def lap(self) -> int:
-        """Return what this thread has used since it was last asked, or it was turned on.
+    def charge(self, costs: Costs, duration_ns: int) -> None:
+        """Add what a call has used that has just ended in this thread, now or soon.
 
-        It is nothing the first time in a thread that is newer than that.
-
-        Returns:
-            Time of the processor in nanoseconds.
+        It is nothing the first time in a thread that is newer than the measurement.
         """
-        return self._pass(get_ident(), thread_time_ns())
+        thread = get_ident()
+        mark = self._marks.get(thread)
+        if mark is None or duration_ns >= _SHORT_NS or monotonic_ns() >= mark.read_ns + _READ_NS:
+            self._share(thread, thread_time_ns(), costs, duration_ns)
+        else:
+            mark.short.append((costs, duration_ns))
 
-    def lap_of(self, thread: int, native: int) -> int:
-        """Return the same of another thread, which may have ended.
+    def charge_running(self, costs: Costs, thread: int, native: int) -> None:
+        """Add what a call has used so far that runs in another thread, which may have ended.
 
         Args:
             thread: Its identifier.
             native: Its number in the system.
         """
-        now_ns = read_thread_clock_ns(native)
-        return 0 if now_ns is None else self._pass(thread, now_ns)
+        used_ns = read_thread_clock_ns(native)
+        if used_ns is not None:
+            self._share(thread, used_ns, costs, _SHORT_NS)
 
-    def _pass(self, thread: int, now_ns: int) -> int:
+    def _share(self, thread: int, used_ns: int, costs: Costs, duration_ns: int) -> None:
         # Taken away, so that of two who ask at once one gets nothing.
-        before_ns = self._marks.pop(thread, None)
-        self._marks[thread] = now_ns
-        return 0 if before_ns is None else max(0, now_ns - before_ns)
+        mark = self._marks.pop(thread, None)
+        self._marks[thread] = _Mark(used_ns)
+        if mark is None:
+            return
+        left_ns = max(0, used_ns - mark.used_ns)
+        total_ns = sum(each_ns for _, each_ns in mark.short)
+        if duration_ns >= _SHORT_NS:
+            # One that waits takes long, but uses nothing then.
+            shared_ns = min(left_ns, total_ns)
+            costs.cpu_ns += left_ns - shared_ns
+        else:
+            mark.short.append((costs, duration_ns))
+            shared_ns, total_ns = left_ns, total_ns + duration_ns
+        for each, each_ns in mark.short:
+            each.cpu_ns += shared_ns * each_ns // max(1, total_ns)
 
     def take_waits(self) -> Waits | None:
         """Return how long others waited for the interpreter since this was last asked."""

@@ -48,7 +48,8 @@ class CallTimes:
 
     def add(self, duration_ns: int) -> None:
         """Count a call that has ended."""
-        cpu_ns = call_meter.lap() if call_meter.is_on else 0
+        if call_meter.is_on:
+            call_meter.charge(self, duration_ns)
         units = duration_ns >> _UNIT_BITS
         shift = units.bit_length() - _SUB_BITS - 1
         bucket = (shift << _SUB_BITS) + (units >> shift) if shift > 0 else units
@@ -58,7 +59,6 @@ class CallTimes:
             counts[bucket] += 1
         else:
             counts[bucket] = 1
-        self.cpu_ns += cpu_ns
         self.total_ns += duration_ns
         if duration_ns > self.most_ns:  # noqa: PLR1730 - `max` would be a call
             self.most_ns = duration_ns
@@ -264,7 +264,7 @@ class HealthRegistry:
             native = natives.get(call.thread)
             entity = self._entities.get((node, call.owner))
             if call.thread is not None and native is not None and entity is not None:
-                entity.times.cpu_ns += call_meter.lap_of(call.thread, native)
+                call_meter.charge_running(entity.times, call.thread, native)
 
     def reports(
         self,

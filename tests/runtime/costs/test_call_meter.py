@@ -3,7 +3,11 @@
 import threading
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
+import pytest
+
+from composer.runtime.costs import call_meter
 from composer.runtime.costs.call_meter import CallMeter
 from composer.runtime.costs.process_costs import ProcessMeter
 from tests.running import DEADLINE_SEC
@@ -51,41 +55,78 @@ def loop():
         pass
 
 
+def charge(meter, duration_ns=ENOUGH_NS):
+    """Return what a call is given that ends now."""
+    costs = SimpleNamespace(cpu_ns=0)
+    meter.charge(costs, duration_ns)
+    return costs.cpu_ns
+
+
+def work():
+    """Use as much of the processor as is seen; return how much."""
+    before_ns = time.thread_time_ns()
+    while time.thread_time_ns() < before_ns + ENOUGH_NS:
+        loop()
+    return time.thread_time_ns() - before_ns
+
+
 def test_a_call_is_given_what_its_thread_has_used_since_the_last_one():
     with measuring() as meter:
-        meter.lap()
-        before_ns = time.thread_time_ns()
-        while time.thread_time_ns() < before_ns + ENOUGH_NS:
-            loop()
-        assert ENOUGH_NS <= meter.lap() <= time.thread_time_ns() - before_ns + ENOUGH_NS
-        assert meter.lap() < ENOUGH_NS
+        charge(meter)
+        used_ns = work()
+        assert ENOUGH_NS <= charge(meter) <= used_ns + ENOUGH_NS
+        assert charge(meter) < ENOUGH_NS
+
+
+def test_short_calls_share_what_they_have_used_by_how_long_they_took(monkeypatch):
+    one, three, long = (SimpleNamespace(cpu_ns=0) for _ in range(3))
+    monkeypatch.setattr(call_meter, '_READ_NS', 10**15)
+    with measuring() as meter:
+        begun_ns = time.thread_time_ns()
+        charge(meter)
+        meter.charge(one, 100_000)
+        meter.charge(three, 300_000)
+        assert one.cpu_ns == three.cpu_ns == 0
+        work()
+        with monkeypatch.context() as patched:
+            patched.setattr(call_meter, '_READ_NS', 0)
+            meter.charge(one, 100_000)
+        assert ENOUGH_NS <= one.cpu_ns + three.cpu_ns <= time.thread_time_ns() - begun_ns
+        assert 2 * three.cpu_ns == pytest.approx(3 * one.cpu_ns, abs=3)
+        # One that took long may have waited: the short ones have no more than their time.
+        before_ns = one.cpu_ns
+        meter.charge(one, 100_000)
+        work()
+        meter.charge(long, ENOUGH_NS)
+        assert one.cpu_ns == before_ns + 100_000
+        assert long.cpu_ns >= ENOUGH_NS - 200_000
 
 
 def test_a_thread_that_sleeps_uses_nothing_and_one_that_is_new_has_no_mark():
-    laps = []
+    given = []
     with measuring() as meter:
-        meter.lap()
+        charge(meter)
         time.sleep(0.05)
-        laps.append(meter.lap())
-        new = threading.Thread(target=lambda: (loop(), laps.append(meter.lap())))
+        given.append(charge(meter))
+        new = threading.Thread(target=lambda: (loop(), given.append(charge(meter))))
         new.start()
         new.join()
-    assert laps[0] < ENOUGH_NS
-    assert laps[1] == 0
+    assert given[0] < ENOUGH_NS
+    assert given[1] == 0
 
 
 def test_a_call_that_does_not_end_is_measured_from_outside():
-    used_ns = []
+    costs = SimpleNamespace(cpu_ns=0)
+
+    def grow():
+        before_ns = costs.cpu_ns
+        meter.charge_running(costs, thread.ident, thread.native_id)
+        return costs.cpu_ns - before_ns
+
     with measuring() as meter:
         with running(loop) as thread:
-            wait_until(
-                lambda: (
-                    used_ns.append(meter.lap_of(thread.ident, thread.native_id))
-                    or sum(used_ns) > ENOUGH_NS
-                ),
-                'costs',
-            )
-        wait_until(lambda: meter.lap_of(thread.ident, thread.native_id) == 0, 'end of it')
+            wait_until(lambda: (grow(), costs.cpu_ns > ENOUGH_NS)[1], 'costs')
+        wait_until(lambda: grow() == 0, 'end of it')
 
 
 def test_who_wants_the_interpreter_beside_a_loop_waits_for_it():
