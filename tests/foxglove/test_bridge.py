@@ -325,16 +325,16 @@ def test_who_does_not_read_holds_nobody_up_and_is_disconnected(start):
         mute = stack.enter_context(connected(port, max_queue=1))
         mute.subscribe('/count', 1)
         mute.subscribe('/big', 2)
+        reader = stack.enter_context(connected(port))
+        reader.subscribe('/count', 1)
         for _ in range(10):
             with ExitStack() as short:
                 for one in [short.enter_context(connected(port)) for _ in range(20)]:
                     one.subscribe('/count', 1)
-        last = stack.enter_context(connected(port))
-        last.subscribe('/count', 1)
-        numbers = [message.data for message in last.messages(1, Int64, count=100)]
+        numbers = [message.data for message in reader.messages(1, Int64, count=100)]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
         wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
-        assert is_connected(last.socket.socket)
+        assert is_connected(reader.socket.socket)
     assert system.stop() == 0
     assert not system.matching('ERROR')
 

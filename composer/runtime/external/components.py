@@ -156,6 +156,9 @@ class Components:
         self, process: ExternalProcess, component: ComponentSpec, is_outdated: Callable[[], bool]
     ) -> None:
         with self._lock:
+            if (process.spec.name, component.key) in self._loaded:
+                # Its container was started again, and got all its components, while it waited.
+                return
             self._is_outdated = is_outdated
             try:
                 self._load(process, component)

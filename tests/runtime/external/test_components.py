@@ -188,6 +188,21 @@ def test_a_container_that_ends_while_it_loads_gets_all_again(compose, listed):
     assert child.stop() == 0
 
 
+def test_a_component_that_waits_while_its_container_is_started_again_is_loaded_once(
+    compose, peer, listed
+):
+    (compose.folder / 'once').touch()
+    wait = {'wait_for': {'topic': '/go', 'timeout': 60}}
+    components = {'talker': component(**wait), 'it': component('Deadly')}
+    child = compose(system({'perception': container(components, restart={'delay': 0})}))
+
+    child.wait_for_line("container 'perception': 2 components were loaded again")
+    peer.run(peer.node.create_publisher, String, '/go', 1)
+    child.wait_for_line('2 components and 1 process ready in ')
+    assert listed('/perception') == {1: '/talker', 2: '/it'}
+    assert child.stop() == 0
+
+
 @pytest.mark.parametrize('has_services', [True, False])
 def test_levels_are_set_where_the_container_has_services_for_them(compose, has_services):
     if has_services:
