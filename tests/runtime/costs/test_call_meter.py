@@ -92,7 +92,7 @@ def test_short_calls_share_what_they_have_used_by_how_long_they_took(monkeypatch
             patched.setattr(call_meter, '_READ_NS', 0)
             meter.charge(one, 100_000)
         assert ENOUGH_NS <= one.cpu_ns + three.cpu_ns <= time.thread_time_ns() - begun_ns
-        assert 2 * three.cpu_ns == pytest.approx(3 * one.cpu_ns, abs=3)
+        assert 2 * three.cpu_ns == pytest.approx(3 * one.cpu_ns, abs=9)
         # One that took long may have waited: the short ones have no more than their time.
         before_ns = one.cpu_ns
         meter.charge(one, 100_000)
