@@ -473,9 +473,8 @@ def test_what_is_older_than_two_periods_is_shown_as_old(compose, browser):
     os.kill(worker['pid'], signal.SIGSTOP)
     try:
         wait_for(lambda: old() >= {'node:/ear', 'row'}, 'the old node')
-        assert 'heard' in browser.find_element('css selector', '#tree .old').get_attribute(
-            'data-age'
-        )
+        age = 'return document.querySelector("#tree .old")?.dataset.age ?? ""'
+        wait_for(lambda: 'heard' in browser.execute_script(age), 'when it was heard')
         wait_for(lambda: old() == {'node:/ear', 'row', 'edge'}, 'what is fresh')
     finally:
         os.kill(worker['pid'], signal.SIGCONT)
