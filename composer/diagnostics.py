@@ -187,8 +187,10 @@ def relative_path(name: str) -> str:
     if name.startswith('<'):
         return name
     # With `pathlib`, thousands of them take a second.
-    folder = os.path.join(os.getcwd(), '')  # noqa: PTH109, PTH118
-    return os.path.abspath(name).removeprefix(folder).replace(os.sep, '/')  # noqa: PTH100
+    path, folder = os.path.abspath(name), os.getcwd()  # noqa: PTH100, PTH109
+    if path == folder:
+        return os.curdir
+    return path.removeprefix(os.path.join(folder, '')).replace(os.sep, '/')  # noqa: PTH118
 
 
 def describe_finding(finding: Diagnostic) -> dict[str, Any]:

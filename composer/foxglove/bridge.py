@@ -163,7 +163,8 @@ class FoxgloveBridge(GraphAccess):
         """Send what comes in bursts: to wake a thread for each message costs far more."""
         entries, serialize = self.queue, _rclpy.rclpy_serialize
         while not self._ended.wait(_BURST_SEC):
-            self._is_wanted.wait()
+            # What came as the last one left is nothing for the next one.
+            self._is_wanted.wait(_LOOK_SEC)
             for _ in range(len(entries)):
                 channel, _, published_ns, data = entries.popleft()
                 try:

@@ -19,6 +19,7 @@ from composer.recordings.recording_place import find_place
 from composer.recordings.serialized_messages import identify_publisher
 from composer.recordings.topic_patterns import TopicPatterns
 from composer.runtime.messages.local_delivery import is_latched
+from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.middleware.ros_graph import create_graph_node
 
 if TYPE_CHECKING:
@@ -143,15 +144,17 @@ def create_tap(
 ) -> Tap:
     """Return what records a message of a publisher, in the thread that publishes it."""
     serialize, queue, append = _rclpy.rclpy_serialize, recorder.queue, recorder.queue.append
-    serializes = recorder.serializes
+    serializes, take = recorder.serializes, ownership_of(message_class).take
 
     def tap(message: Any, may_keep: bool) -> None:  # noqa: FBT001 - as `Tap`
         if len(queue) >= recorder.room:
             recorder.lost += 1
             return
         try:
-            keeps = may_keep and serializes
-            data = message if keeps else serialize(message, message_class)
+            if may_keep and serializes:
+                data = take(message, is_held=False)
+            else:
+                data = serialize(message, message_class)
         except Exception as error:  # noqa: BLE001 - whoever publishes it is told by rclpy
             report(f"a message of '{channel.topic}' is left out: {error}")
             return

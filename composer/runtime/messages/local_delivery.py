@@ -56,9 +56,9 @@ class LocalPublisher:
         is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
-        tap: Called with each message before it goes anywhere, and with whether it may keep the
-            message, which nobody changes then; it must not change it. What it returns true for
-            goes nowhere.
+        tap: Called with each message before it goes anywhere, and with whether it may keep it, as
+            `Ownership.take` returns it: else it must not change or keep it. What it returns true
+            for goes nowhere.
         published: How many messages it was given.
     """
 
@@ -143,13 +143,9 @@ class LocalPublisher:
         """
         self.published += 1
         # A client that leaves takes it away, in another thread.
-        if (tap := self.tap) is not None:
-            may_keep = not is_held and not self._inboxes
-            if may_keep:
-                message = self._ownership.take(message, is_held=False)
-            if tap(message, may_keep):
-                return
-        self.deliver(message, is_held=is_held)
+        tap = self.tap
+        if tap is None or not tap(message, not is_held and not self._inboxes):
+            self.deliver(message, is_held=is_held)
 
     def deliver(self, message: Any, *, is_held: bool) -> None:
         """Hand over or send a message that was published."""
