@@ -1,4 +1,4 @@
-"""The page for people who come from launch files: each of its systems checks, and runs."""
+"""The page for people who come from launch files: its systems check, and run."""
 
 import os
 import re
@@ -57,6 +57,16 @@ def read_examples():
 
 
 EXAMPLES = read_examples()
+# The last example of each of these does more, as it runs, than start programs.
+RUN = (
+    'Values from commands and files',
+    'Includes with arguments',
+    'Programs, respawn, shutdown',
+    'Event handlers and timers',
+    'Composable nodes',
+    'Lifecycle nodes',
+    'What nodes do in code',
+)
 
 
 def test_the_page_shows_each_thing_that_a_launch_file_does():
@@ -131,11 +141,9 @@ def test_an_example_has_no_findings(folder, files):
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(
-    'files', [files for _, files in EXAMPLES], ids=[heading for heading, _ in EXAMPLES]
-)
-def test_an_example_runs_and_stops(folder, compose, files):
-    path, words = write(folder, files)
+@pytest.mark.parametrize('heading', RUN)
+def test_an_example_runs_and_stops(folder, compose, heading):
+    path, words = write(folder, dict(EXAMPLES)[heading])
     child = compose.run(path, *words)
     child.wait_until_ready()
     assert child.stop() == 0, child.output

@@ -95,27 +95,18 @@ def test_add_two_ints_server_answers_an_external_client(up, peers):
 
 
 def test_add_two_ints_client_waits_for_an_external_server_and_ends(up, peers):
-    child = up('add_two_ints_client', '5', '10')
+    child = up('add_two_ints_client', 'b:=-3', '-4')
     child.wait_for_line(f'[INFO] [minimal_client_async]: {WAITING}')
     peers.serve('add_two_ints_server')
 
     assert child.wait() == 0
     said = said_by(child, 'minimal_client_async')
-    assert said[-1] == 'Result of add_two_ints: for 5 + 10 = 15'
+    assert said[-1] == 'Result of add_two_ints: for -4 + -3 = -7'
     assert said[0] == WAITING
     assert set(said[:-1]) <= {WAITING, ASKING_AGAIN}
 
 
-def test_add_two_ints_client_takes_names_and_negative_numbers(up, peers):
-    peers.serve('add_two_ints_server')
-    child = up('add_two_ints_client', 'b:=-3', '-4')
-
-    assert child.wait() == 0
-    said = said_by(child, 'minimal_client_async')
-    assert said[-1] == 'Result of add_two_ints: for -4 + -3 = -7'
-
-
-def test_fibonacci_server_gives_an_external_client_feedback_and_the_sequence(up, peers):
+def test_fibonacci_server_gives_feedback_and_the_sequence_and_can_be_canceled(up, peers):
     child = up('fibonacci_server')
     child.wait_until_ready()
     outcome = peers.ask('send_goal', 3)
@@ -131,12 +122,7 @@ def test_fibonacci_server_gives_an_external_client_feedback_and_the_sequence(up,
         'Feedback: [0, 1, 1]',
         'Feedback: [0, 1, 1, 2]',
     ]
-    assert child.stop() == 0
 
-
-def test_fibonacci_server_stops_when_an_external_client_cancels(up, peers):
-    child = up('fibonacci_server')
-    child.wait_until_ready()
     outcome = peers.ask('send_goal', 40, 'cancel')
 
     assert outcome['status'] == CANCELED
@@ -158,14 +144,6 @@ def test_fibonacci_client_sends_order_10_to_an_external_server_and_ends(up, peer
     assert said[-1] == f'Result: {sequence}'
 
 
-def test_fibonacci_client_takes_an_order(up, peers):
-    peers.serve('fibonacci_server')
-    child = up('fibonacci_client', 'order:=3')
-
-    assert child.wait() == 0
-    assert said_by(child, 'fibonacci_action_client')[-1] == 'Result: [0, 1, 1, 2]'
-
-
 def test_fibonacci_client_says_that_it_was_refused(up, peers):
     peers.serve('fibonacci_server', 'refuse')
     child = up('fibonacci_client')
@@ -177,7 +155,6 @@ def test_fibonacci_client_says_that_it_was_refused(up, peers):
 def test_calculator_server_does_what_its_parameter_says(up, peers):
     child = up('calculator_server')
     child.wait_until_ready()
-    assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 15
     assert peers.ask('set_operation', 'subtract') == [True, '']
     assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 5
 
@@ -185,25 +162,19 @@ def test_calculator_server_does_what_its_parameter_says(up, peers):
     assert not accepted
     assert 'add' in reason
     assert 'subtract' in reason
-    assert peers.ask('ask_for_sum', 'calculate', 10, 5) == 5
-    assert said_by(child, 'calculator_server') == ['10 + 5 = 15', '10 - 5 = 5', '10 - 5 = 5']
+    assert said_by(child, 'calculator_server') == ['10 - 5 = 5']
     assert child.stop() == 0
 
 
 def test_calculator_client_takes_an_external_server_as_it_is_or_sets_it(up, peers):
     peers.serve('calculator_server')
     results = []
-    for words in (
-        ['10', '5'],
-        ['10', '5', 'subtract'],
-        ['10', '5'],
-        ['operation:=add', '10', '5'],
-    ):
+    for words in (['10', '5', 'subtract'], ['10', '5']):
         child = up('calculator_client', *words)
         assert child.wait() == 0, child.output
         results.append(said_by(child, 'calculator_client')[-1])
 
-    assert results == ['Result: 15', 'Result: 5', 'Result: 5', 'Result: 15']
+    assert results == ['Result: 5', 'Result: 5']
 
 
 def test_calculator_client_and_server_work_together(up):

@@ -69,10 +69,9 @@ def nodes_of(peer):
 
 LAYERS = {
     'as it is': ([], 'robot', 'front rear', (3.0, 1.0), (13.0, 17.0)),
-    'with an argument': (['robot:=rover'], 'rover', 'front rear', (-9.0,), (-15.0, -15.0)),
-    'in the warehouse': (
-        ['configs/sites/warehouse.yaml'],
-        'forklift',
+    'in the warehouse, with an argument': (
+        ['configs/sites/warehouse.yaml', 'robot:=rover'],
+        'rover',
         'front rear',
         (1.0, 1.0),
         (6.0, 14.0),

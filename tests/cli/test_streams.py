@@ -3,32 +3,33 @@
 import os
 import subprocess
 import sys
+from itertools import islice
 
 import pytest
 
 from tests.running import ROOT
 
 BAD = 'composer/rules/bad-key/bad.yaml'
-# Each with the exit code where all streams are open.
+# Each with the exit code where all streams are open; the first three have each of these codes.
 COMMANDS = {
     'check configs/greeter.yaml': 0,
-    f'check --format json {BAD}': 1,
     f'up {BAD}': 1,
+    'unknown': 2,
+    f'check --format json {BAD}': 1,
     'graph configs/greeter.yaml': 0,
     '--help': 0,
-    'unknown': 2,
 }
 FULL = 'error: cannot write the output: No space left on device\n'
 
 
 @pytest.fixture(scope='module')
 def run_all():
-    """Run all commands with a redirection; return exit code and output of each."""
+    """Run commands with a redirection; return exit code and output of each."""
 
-    def run_all(redirection):
+    def run_all(redirection, commands=COMMANDS):
         script = ''.join(
             f'"$0" -m composer {command} {redirection}; echo "=== $?"; echo "===" >&2\n'
-            for command in COMMANDS
+            for command in commands
         )
         result = subprocess.run(
             ['sh', '-c', script, sys.executable],
@@ -49,12 +50,13 @@ def run_all():
 
 @pytest.mark.parametrize('redirection', ['>&-', '2>&-', '<&-', '>&- 2>&- <&-', '2>/dev/full'])
 def test_without_a_stream_the_exit_code_is_the_same(run_all, redirection):
-    codes, _ = run_all(redirection)
+    expected = dict(islice(COMMANDS.items(), 3))
+    codes, _ = run_all(redirection, expected)
     if redirection == '2>/dev/full':
         # What is said there cannot be said.
-        assert [bool(code) for code in codes] == [bool(code) for code in COMMANDS.values()]
+        assert [bool(code) for code in codes] == [bool(code) for code in expected.values()]
     else:
-        assert codes == list(COMMANDS.values())
+        assert codes == list(expected.values())
 
 
 def test_a_full_standard_output_is_an_ordinary_error(run_all):
@@ -88,11 +90,8 @@ def end_without_reader(words, folder, **variables):
     ('words', 'code'),
     [
         ('explain', 0),
-        ('check good.yaml', 0),
         ('check bad.yaml', 1),
-        ('show good.yaml', 0),
         ('graph good.yaml', 0),
-        ('plan good.yaml other.yaml', 0),
         ('plan good.yaml other.yaml --exit-code', 2),
     ],
 )

@@ -67,8 +67,6 @@ def start_once(node):
 """
 STARTED = 6
 STARTING = 'version: 1\nexecutor: {{shutdown_timeout: {}}}\nnodes: {{n: {{on_start: {}}}}}\n'
-# In the process of the system, or in one of its own.
-PLACES = pytest.mark.parametrize('worker', ['', 'worker: w, '], ids=['system', 'worker'])
 HOLDING = """
 version: 1
 executor: {shutdown_timeout: 0.5}
@@ -152,7 +150,7 @@ def test_silence_is_reported_unless_the_process_is_stopped(capfd, monkeypatch, w
     assert ' a behaviour keeps the interpreter from all others' in capfd.readouterr().err
 
 
-def test_a_call_that_holds_the_interpreter_is_reported(compose):
+def test_a_call_that_holds_the_interpreter_is_reported(compose, wait_for):
     code = CODE.replace('sleep(1000)', "sleep(8)\n    node.logger.info('went on')")
     child = compose(STARTING.format(5, 'parts:hold_interpreter'), code)
     child.wait_for_line('went on')
@@ -161,7 +159,10 @@ def test_a_call_that_holds_the_interpreter_is_reported(compose):
     assert places == sorted(places)
     child.wait_for_line('[INFO] [composer]: the system answers again')
     child.wait_until_ready()
+    guardian = guardian_of(child)
+
     assert child.stop() == 0
+    wait_for(lambda: not is_there(guardian), 'its end')
 
 
 def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
@@ -174,7 +175,7 @@ def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
     assert capfd.readouterr().err == ''
 
 
-@pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGHUP'], ['SIGINT', 'SIGINT']])
+@pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGINT', 'SIGINT']])
 def test_a_process_that_holds_the_interpreter_is_killed(compose, signals):
     child = compose(HOLDING, CODE)
     child.wait_for_line('holding')
@@ -208,9 +209,8 @@ def stack_of(pid):
     )
 
 
-@PLACES
-def test_processes_of_behaviours_end_with_the_system(compose, worker):
-    child = compose(STARTING.format(30, 'parts:start').replace('on_', f'{worker}on_'), CODE)
+def test_processes_of_behaviours_of_a_worker_end_with_the_system(compose):
+    child = compose(STARTING.format(30, 'parts:start').replace('on_', 'worker: w, on_'), CODE)
     pids = started_by(child)
 
     assert child.stop() == 0
@@ -221,10 +221,9 @@ def test_processes_of_behaviours_end_with_the_system(compose, worker):
     assert not child.matching('resource_tracker')
 
 
-@PLACES
-def test_processes_of_behaviours_that_do_not_end_are_killed(compose, worker):
+def test_processes_of_behaviours_that_do_not_end_are_killed(compose):
     start = "{behaviour: 'parts:start', with: {deaf: true}}"
-    child = compose(STARTING.format(2, start).replace('on_', f'{worker}on_'), CODE)
+    child = compose(STARTING.format(2, start), CODE)
     pids = started_by(child)
 
     assert child.stop() == 1
@@ -240,18 +239,6 @@ def test_processes_of_behaviours_end_with_a_system_that_is_killed(compose, wait_
     wait_for(lambda: not any(map(is_there, pids)), 'their end')
     for pid in pids:
         assert child.wait_for_line(f'process {pid} (').endswith(' outlived the system: killed')
-
-
-def test_processes_of_behaviours_end_with_a_worker_that_is_killed(compose, wait_for):
-    text = STARTING.format(30, 'parts:start').replace('on_', 'worker: w, on_')
-    child = compose(text, CODE)
-    pids = started_by(child)
-    os.kill(worker_of(child), signal.SIGKILL)
-
-    wait_for(lambda: not any(map(is_there, pids)), 'their end')
-    for pid in pids:
-        assert child.wait_for_line(f'process {pid} (').endswith(" outlived worker 'w': killed")
-    assert child.stop() == 0
 
 
 def test_processes_of_behaviours_end_with_a_worker_that_cannot_start_again(compose, wait_for):
@@ -275,15 +262,6 @@ def test_a_system_does_without_its_guardian(compose, wait_for):
     wait_for(lambda: not is_there(guardian), 'its end')
 
     assert child.stop() == 0
-
-
-def test_the_guardian_ends_with_the_system(compose, wait_for):
-    child = compose('version: 1\nnodes: {n: {}}\n', '')
-    child.wait_until_ready()
-    guardian = guardian_of(child)
-
-    assert child.stop() == 0
-    wait_for(lambda: not is_there(guardian), 'its end')
 
 
 def test_processes_of_a_program_that_calls_up_are_its_own(compose, start_program):

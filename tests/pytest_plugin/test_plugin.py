@@ -211,7 +211,7 @@ def test_tests_in_python_drive_systems(run):
 
 
 def test_other_plugins_work_with_it(run):
-    words = ('-n', '2', '--timeout', '100', '-k', 'stops or patched or times')
+    words = ('-n', '1', '--timeout', '100', '-k', 'stops or patched or times')
     files = {'test_car.py': DRIVING, 'car.scenario.yaml': SCENARIO}
     run(*words, **files).assert_outcomes(passed=2)
 

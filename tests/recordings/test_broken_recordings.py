@@ -14,7 +14,7 @@ DATA = b'\0\1\0\0\5\0\0\0text\0'
 COUNT = 6
 
 
-@pytest.fixture(params=list(CompressionType))
+@pytest.fixture(params=[CompressionType.NONE, CompressionType.ZSTD])
 def whole(request, tmp_path):
     path = tmp_path / 'a.mcap'
     with path.open('wb') as stream:

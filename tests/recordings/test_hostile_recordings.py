@@ -58,28 +58,13 @@ def part_elsewhere(path):
 
 
 @case('which is no type of ROS')
-def part_of_root(path):
-    write_topics(path, kind='odd_msgs/msg/Odd', text=PARTED.format('/tmp/escaped'))
-
-
-@case('which is no type of ROS')
 def long_part(path):
     write_topics(path, kind='odd_msgs/msg/Odd', text=PARTED.format(f'x/{"Y" * 300}'))
-
-
-@case('which is no type of ROS')
-def part_with_nul(path):
-    write_topics(path, kind='odd_msgs/msg/Odd', text=PARTED.format('x/Y\0'))
 
 
 @case("'../../../escaped' is no type of ROS")
 def type_elsewhere(path):
     write_topics(path, kind='../../../escaped')
-
-
-@case('is no type of ROS')
-def type_with_newline(path):
-    write_topics(path, kind='std_msgs/msg/String\n')
 
 
 @case('the definition of odd_msgs/msg/Odd has more than 2 MB')
@@ -90,11 +75,6 @@ def large_definition(path):
 @case('a topic name is not empty')
 def no_name(path):
     write_topics(path, [''])
-
-
-@case('a topic name has only letters')
-def name_with_spaces(path):
-    write_topics(path, ['/a b'])
 
 
 @case(r'\x1b')
@@ -211,6 +191,11 @@ def endless_merges(path):
     write_folder(path, f'a0: &a0 {{x: 1}}\n{levels}')
 
 
+# Those that a check reads more of, or otherwise, than of a short file with a wrong word in it.
+CHECKED = [name for name, (_, expected) in CASES.items() if expected == SLOW]
+CHECKED += ['tiny_records', 'part_elsewhere', 'many_types', 'fifo', 'device', 'zeros']
+CHECKED += ['lying_lz4', 'endless_aliases']
+
 SCENARIO = """\
 version: 1
 system: {file: system.yaml}
@@ -240,7 +225,7 @@ def written(folder):
     return sorted(str(each) for each in folder.parents[2].rglob('*') if each.name != 'output.txt')
 
 
-@pytest.mark.parametrize('name', CASES)
+@pytest.mark.parametrize('name', CHECKED)
 def test_a_check_of_a_scenario_is_done_in_seconds(name, in_folder):
     CASES[name][0](Path('a.mcap'))
     Path('a.scenario.yaml').write_text(SCENARIO)
@@ -280,7 +265,7 @@ def test_sizes_that_no_memory_has_are_not_built(size, in_folder):
     assert "'/a' is not published" in output
 
 
-@pytest.mark.parametrize('start', ['1e308', 'inf', 'nan'])
+@pytest.mark.parametrize('start', ['1e308', 'nan'])
 def test_a_start_beyond_all_times_is_no_fault_of_composer(start, in_folder):
     write_topics(Path('a.mcap'))
     code, output = run_limited(in_folder, ['replay', 'a.mcap', '--start', start])

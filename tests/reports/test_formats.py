@@ -4,6 +4,7 @@ import json
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -103,11 +104,17 @@ def check_text(report, text):
     assert all(f'[{rule}]: ' in text for rule in rules)
 
 
+@cache
+def load_schema(name):
+    schema = json.loads((SCHEMAS / name).read_text())
+    Draft202012Validator.check_schema(schema)
+    return schema
+
+
 def check_json(report, text):
     is_check = report.cases is None
-    name = 'report.schema.json' if is_check else 'test_report.schema.json'
-    schema, document = json.loads((SCHEMAS / name).read_text()), json.loads(text)
-    Draft202012Validator.check_schema(schema)
+    schema = load_schema('report.schema.json' if is_check else 'test_report.schema.json')
+    document = json.loads(text)
     Draft202012Validator(schema).validate(document)
     assert set(document) == set(schema['properties'])
     of_findings = schema['properties']['findings']['items']

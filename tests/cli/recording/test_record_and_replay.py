@@ -225,52 +225,39 @@ def test_types_that_are_not_installed_are_built_of_the_file(
     assert (read[2].pair.a, read[2].pair.b, read[2].text.data) == (1, 2, 'text')
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_recording_ends_with_each_signal(recording, tmp_path, number):
+def test_a_recording_of_a_script_ends_with_sigint(recording, tmp_path):
     """SIGINT is ignored at the start of what a script runs in the background."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        _end_with(recording, tmp_path, number)
+        with recording('-o', 'bag') as lines:
+            pass
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _end_with(recording, tmp_path, number):
-    with recording('-o', 'bag', number=number) as lines:
-        pass
     assert lines[0] == "recording to 'bag'; Ctrl-C ends it"
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
 
-def test_the_default_is_a_new_folder_with_the_time(recording, tmp_path):
-    with recording():
+def test_the_default_is_a_new_folder_with_the_time_and_sigterm_ends_it(recording, tmp_path):
+    with recording(number=signal.SIGTERM):
         pass
     (folder,) = tmp_path.glob('rosbag2_*')
     assert [each.suffix for each in sorted(folder.iterdir())] == ['.yaml', '.mcap']
 
 
-def test_latched_messages_are_recorded_although_they_came_before(
+def test_topics_that_come_and_go_and_latched_messages_of_before_are_recorded(
     recording, peer, tmp_path, wait_for
 ):
     from rclpy.qos import DurabilityPolicy, QoSProfile
-    from std_msgs.msg import String
+    from std_msgs.msg import Int32, String
 
     profile = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = peer.run(peer.node.create_publisher, String, '/map', profile)
     for text in 'abc':
         peer.run(publisher.publish, String(data=text))
-    with recording('-o', 'a.mcap', '--topics', '/map'):
+    topics = ('--topics', '/map', '--topics', '/early', '--topics', '/late')
+    with recording('-o', 'a.mcap', *topics):
         wait_for(publisher.get_subscription_count, 'the recorder')
         wait_for(publisher.wait_for_all_acked, 'what it takes')
-
-    read = [each.data for _, _, each in read_recording(tmp_path / 'a.mcap').messages()]
-    assert read == list('abc')
-
-
-def test_topics_that_come_and_go_are_recorded(recording, peer, tmp_path, wait_for):
-    from std_msgs.msg import Int32, String
-
-    with recording('-o', 'a.mcap', '--topics', '/early', '--topics', '/late'):
         for topic, kind in (('/early', String), ('/late', Int32)):
             publisher = peer.advertise(kind, topic)
             for _ in range(100):
@@ -278,8 +265,10 @@ def test_topics_that_come_and_go_are_recorded(recording, peer, tmp_path, wait_fo
             wait_for(publisher.wait_for_all_acked, 'what is recorded')
             peer.run(peer.node.destroy_publisher, publisher)
 
-    counts = Counter(topic for _, topic, _ in read_recording(tmp_path / 'a.mcap').messages())
-    assert counts == {'/early': 100, '/late': 100}
+    read = [*read_recording(tmp_path / 'a.mcap').messages()]
+    assert [each.data for _, topic, each in read if topic == '/map'] == list('abc')
+    counts = Counter(topic for _, topic, _ in read)
+    assert counts == {'/map': 3, '/early': 100, '/late': 100}
 
 
 def test_a_later_publisher_that_offers_less_is_told(recording, peer, tmp_path, wait_for):
@@ -302,16 +291,12 @@ def test_a_later_publisher_that_offers_less_is_told(recording, peer, tmp_path, w
     ('words', 'code', 'lines'),
     [
         (['replay', 'absent.mcap'], 1, ["error: there is no recording 'absent.mcap'"]),
-        (['replay', 'text.mcap'], 1, ["error: 'text.mcap' is no MCAP file"]),
         (['replay', 'a.mcap', '--rate', '0'], 2, ["error: invalid value for '--rate'"]),
         (['replay', 'a.mcap', '--topics', '/x'], 1, ["error: 'a.mcap' has nothing to publish"]),
         (['record', '-o', 'a.mcap'], 2, ["error: 'a.mcap' exists, and is not overwritten"]),
-        (['record', '-o', 'no/a.mcap'], 2, ["error: there is no folder 'no' for the recording"]),
-        (['record', '-o', '/dev/full'], 2, ["error: '/dev/full' exists, and is not overwritten"]),
     ],
 )
 def test_wrong_use_is_an_error(run, tmp_path, words, code, lines):
-    (tmp_path / 'text.mcap').write_text('some text')
     write_recording(tmp_path / 'a.mcap', {'/a': [filled(string_class())]})
 
     result = run(*words)

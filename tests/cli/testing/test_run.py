@@ -59,7 +59,6 @@ def test_the_default_is_what_lies_under_tests(project, capsys):
     [
         (['-k', 'not miscounts'], {'counts': 'passed'}),
         (['-x'], {'miscounts': 'failed'}),
-        (['tests/worker.scenario.yaml::counts'], {'counts': 'passed'}),
         (['--jobs', '2'], {'miscounts': 'failed', 'counts': 'passed'}),
     ],
 )
@@ -153,7 +152,7 @@ def processes_of(pid):
     return found
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
 def test_a_signal_ends_all_and_leaves_nothing_behind(project, wait_for, number, tmp_path):
     project.scenario(
         'blocks: {given: {parameters: {worker: {mode: blocks}}}, then: [{exit_code: 0}]}'
