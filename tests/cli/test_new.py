@@ -78,7 +78,7 @@ def test_a_ros_package_is_one_with_a_system_that_has_no_errors(folder, capsys):
     assert 'unknown-field' in capsys.readouterr().out
 
 
-@pytest.mark.parametrize('name', ['systems', 'interfaces', 'test', 'resource'])
+@pytest.mark.parametrize('name', ['systems', 'resource'])
 def test_no_folder_of_a_ros_package_has_two_meanings(folder, capsys, name):
     assert run(['new', '--ros-package', name]) == 2
     assert f"'{name}' cannot name a ROS package" in capsys.readouterr().err
@@ -150,12 +150,6 @@ def test_files_for_other_tools_are_what_these_read(project):
     assert (hook['id'], hook['entry'], hook['types']) == (own['id'], own['entry'], own['types'])
 
 
-def test_it_names_no_host(project):
-    for path, text in texts(project).items():
-        # The schema has the address of its own format.
-        assert path.startswith('schemas/') or '://' not in text
-
-
 def run_tests_in(project):
     return run_in(project, 'pytest', '-p', 'no:cacheprovider', *PLUGIN_OPTIONS)
 
@@ -181,11 +175,7 @@ def test_its_scenario_fails_if_the_system_does_not_work(project, monkeypatch, ca
     [
         ('MyRobot', 'myrobot'),
         ('my-robot', 'my_robot'),
-        ('2robots', 'robots'),
         ('robots/arm', 'robots_arm'),
-        ('../x', 'x'),
-        ('_x', 'x'),
-        ('röbot', 'r_bot'),
         ('x\n', 'x'),
     ],
 )

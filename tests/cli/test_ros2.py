@@ -41,7 +41,6 @@ def test_all_words_are_composer_s(words):
 @pytest.mark.parametrize(
     ('words', 'code', 'said'),
     [
-        (['--version'], 0, 'composer, version '),
         (['check', '-q', GREETER], 0, ''),
         (['check', '--strct', GREETER], 2, "no such option '--strct'"),
     ],

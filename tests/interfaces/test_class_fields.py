@@ -9,7 +9,6 @@ from composer.interfaces.class_fields import UnsupportedFieldError, describe_cla
 from composer.interfaces.classes import import_interface
 from composer.interfaces.descriptions import (
     ActionDescription,
-    FieldDescription,
     FieldType,
     MessageDescription,
     ServiceDescription,
@@ -84,13 +83,3 @@ def test_a_type_that_only_idl_has_is_named(name: str) -> None:
     assert str(caught.value) == (
         f'my_msgs/msg/Odd.data is of the IDL type {name!r}, which .msg files do not have'
     )
-
-
-def test_an_empty_message_has_no_fields() -> None:
-    empty = describe_class(import_interface('std_msgs/msg/Empty'))
-    assert empty == MessageDescription('std_msgs/msg/Empty', ())
-
-
-def test_a_field_has_no_default_there() -> None:
-    string = describe_class(import_interface('std_msgs/msg/String'))
-    assert string.fields == (FieldDescription('data', FieldType('string')),)

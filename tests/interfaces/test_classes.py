@@ -66,11 +66,6 @@ def test_a_package_that_only_tools_find_is_not_called_absent(
             "did you mean 'std_srvs/srv/SetBool'?",
         ),
         (
-            'sensor_msgs/action/Qqq',
-            "sensor_msgs/action/Qqq: the package 'sensor_msgs' has no actions",
-            None,
-        ),
-        (
             'sensor_msgs/msg/SetCameraInfo',
             (
                 "sensor_msgs/msg/SetCameraInfo: 'SetCameraInfo' is not one of the messages of "
@@ -86,11 +81,6 @@ def test_a_package_that_only_tools_find_is_not_called_absent(
         (
             'std_msgs/String',
             "'std_msgs/String' is not the name of an interface",
-            "did you mean 'std_msgs/msg/String'?",
-        ),
-        (
-            'std_msgs.msg.String',
-            "'std_msgs.msg.String' is not the name of an interface",
             "did you mean 'std_msgs/msg/String'?",
         ),
         (

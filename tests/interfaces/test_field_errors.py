@@ -4,7 +4,6 @@ from composer.interfaces.field_errors import (
     describe_value,
     format_field_error,
     format_path,
-    no_message,
     unknown_field,
 )
 
@@ -47,27 +46,6 @@ def test_a_path_is_written_as_code() -> None:
 def test_an_error_names_message_and_field() -> None:
     assert format_field_error('a/msg/B', ('c', 0), 'wrong') == 'a/msg/B: c[0]: wrong'
     assert format_field_error('a/msg/B', (), 'a/msg/B has no field') == 'a/msg/B has no field'
-
-
-def test_an_unknown_field_is_answered_with_the_nearest_and_all() -> None:
-    near = unknown_field('a/msg/B', 'liner', ['linear', 'angular'])
-    assert (near.rule, str(near), near.help) == (
-        'unknown-field',
-        "a/msg/B has no field 'liner'",
-        "did you mean 'linear'? its fields are linear, angular",
-    )
-    assert unknown_field('a/msg/B', 5, ['x', 'y']).help == 'its fields are x, y'
-    assert unknown_field('a/msg/B', 'x', []).help == 'it has no fields'
-
-
-def test_what_is_no_message_is_answered_with_its_fields() -> None:
-    error = no_message('a/msg/B', 5, ['x', 'y'])
-    assert (error.rule, str(error), error.help) == (
-        'field-type',
-        'expected a/msg/B, got int 5',
-        'give its fields by name: x, y',
-    )
-    assert no_message('a/msg/B', 5, []).help == 'it has no fields: write {}'
 
 
 def test_the_path_of_an_error_grows_from_the_inside() -> None:

@@ -265,9 +265,3 @@ def test_the_length_of_an_array_is_checked(array: str, right: list[int], wrong: 
             check_length(field_type, length)
         assert caught.value.rule == 'field-length'
         assert str(caught.value) == f'expected {field_type}, got {length} items'
-
-
-def test_one_item_is_said_in_the_singular() -> None:
-    with pytest.raises(FieldError) as caught:
-        check_length(FieldType('int8', array='fixed', array_bound=3), 1)
-    assert str(caught.value) == 'expected int8[3], got 1 item'

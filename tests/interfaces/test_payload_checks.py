@@ -145,17 +145,6 @@ def test_bare_values_lie_where_the_message_does(catalogue: InterfaceCatalogue) -
     ]
 
 
-def test_what_is_no_list_is_one_finding(catalogue: InterfaceCatalogue) -> None:
-    assert list(check_payload(THING, {'limits': 3}, catalogue)) == [
-        FieldFinding(
-            ('limits',),
-            'my_msgs/msg/Thing: limits: expected int8[2], got int 3',
-            'write it as a list',
-            'field-type',
-        ),
-    ]
-
-
 def test_a_message_that_is_none_is_a_finding_of_the_message(catalogue: InterfaceCatalogue) -> None:
     assert list(check_payload(VECTOR, None, catalogue)) == [
         FieldFinding(

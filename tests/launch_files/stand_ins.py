@@ -27,16 +27,6 @@ class PythonExpression(Substitution):
         self.expression, self.python_modules = expression, []
 
 
-class EnvironmentVariable(Substitution):
-    def __init__(self, name, default_value):
-        self.name, self.default_value = name, default_value
-
-
-class FindPackageShare(Substitution):
-    def __init__(self, package):
-        self.package = package
-
-
 class PathJoinSubstitution(Substitution):
     def __init__(self, substitutions):
         self.substitutions = substitutions

@@ -58,15 +58,6 @@ def test_a_node_waits_for_one_on_another_host_and_hears_it(
     assert (jetson.stop(), base.stop()) == (0, 0)
 
 
-def test_hosts_that_may_not_multicast_find_nobody(create_hosts):
-    """Else the other tests would show nothing."""
-    hosts = create_hosts('base', 'jetson')
-    hosts.write(SYSTEM.replace('[{node', '[{timeout: 4, node'), CODE, discovery='multicast')
-    base, jetson = hosts.up('base'), hosts.up('jetson')
-    jetson.wait_for(' ready in ')
-    base.wait_for("waited 4 s for the node '/camera': there is no such node")
-
-
 @pytest.mark.long
 def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
     """Who is there already, and who comes then, find each other by it."""

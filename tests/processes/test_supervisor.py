@@ -292,34 +292,6 @@ def test_nothing_marked_is_left_after_the_death_of_both_reapers(compose, stubbor
     assert stubborn.left() == {}
 
 
-def test_nothing_is_left_after_a_start_that_fails(compose, stubborn):
-    code = """
-        import time
-
-        from contextlib import suppress
-        from pathlib import Path
-
-        def fail(node, path):
-            while sum(path.encode() in line for line in command_lines()) < 3:
-                time.sleep(0.01)
-            raise OSError('no such device')
-
-        def command_lines():
-            for folder in Path('/proc').glob('[0-9]*'):
-                # Any process of the machine may end meanwhile.
-                with suppress(OSError):
-                    yield (folder / 'cmdline').read_bytes()
-    """
-    nodes = {
-        'bad': {'on_start': {'behaviour': 'parts:fail', 'with': {'path': str(stubborn.path)}}}
-    }
-    child = compose(system(stubborn.process('family'), nodes), code)
-
-    assert child.wait() == 1
-    assert child.lines[-1] == "error: node 'bad': on_start raised OSError('no such device')"
-    assert stubborn.left() == {}
-
-
 def test_processes_stop_after_on_stop_of_the_nodes(compose):
     code = """
         def tell(node):
@@ -409,7 +381,7 @@ def test_a_flood_of_output_without_end_of_line_is_not_kept(compose):
         def tell(node):
             node.logger.info(f'{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB')
     """
-    million = 25
+    million = 12
     flood = shell(f"head -c {million}000000 /dev/zero | tr '\\0' '#'")
     nodes = {'n': {'on_start': 'parts:tell', 'on_stop': 'parts:tell'}}
     child = compose(system({'driver': {'command': flood}}, nodes), code)
@@ -418,7 +390,7 @@ def test_a_flood_of_output_without_end_of_line_is_not_kept(compose):
     assert child.stop() == 0
     assert child.output.count('#') == million * 1_000_000
     before, after = (int(line.split()[-2]) for line in child.matching(' MB'))
-    assert after - before < 20
+    assert after - before < 10
 
 
 def test_output_that_nobody_takes_does_not_keep_the_system_from_stopping(compose, start_program):
@@ -488,21 +460,7 @@ def test_a_process_that_keeps_dying_is_started_again_ever_more_slowly(compose):
     ]
 
 
-def test_restart_waits_for_its_delay(compose):
-    restart = {'when': 'always', 'delay': 0.3, 'max': 3}
-    child = compose(system({'good': {'command': ['true'], 'restart': restart}}))
-    child.wait_for_line('was started again 3 times already')
-
-    end = "[INFO] [composer]: process 'good' has ended with exit code 0"
-    assert child.matching(end) == [
-        f'{end}; it is started again in 0.3 s',
-        f'{end}; it is started again in 0.3 s',
-        f'{end}; it is started again in 0.4 s',
-        f'{end}, and was started again 3 times already',
-    ]
-
-
-def test_restart_is_for_the_ends_that_it_names(compose):
+def test_restart_is_for_the_ends_that_it_names_and_waits_for_its_delay(compose):
     cases = {
         'never': ('never', 'exit 1', 0, 1),
         'on_failure_after_success': ('on_failure', 'exit 0', 0, 1),
@@ -522,20 +480,18 @@ def test_restart_is_for_the_ends_that_it_names(compose):
 
     for name, (*_, runs) in cases.items():
         assert len(child.matching(f'[{name}] run')) == runs
+    assert child.matching("process 'on_failure' was ended by SIGKILL; it is started again in 1 s")
 
 
 @pytest.mark.parametrize(
     ('process', 'message'),
     [
         ({'command': ['no_such_program']}, "there is no program 'no_such_program' on the PATH"),
-        ({'command': ['./missing']}, "there is no program 'missing'"),
-        ({'command': ['./system.yaml']}, "'system.yaml' is not executable"),
         ({'command': ['true'], 'cwd': 'nowhere'}, "there is no folder 'nowhere' to run in"),
         (
             {'command': ['./empty.bin']},
             "cannot be started: './empty.bin': Exec format error",
         ),
-        ({'command': ['echo', 'a\0b']}, "'a\\x00b' contains a null character"),
     ],
 )
 def test_a_process_that_cannot_be_started_ends_the_start(compose, stubborn, process, message):
@@ -759,7 +715,7 @@ def test_many_systems_in_a_row_leave_nothing_behind(compose, stubborn, scratch):
 
         composer.up(sys.argv[1])
         before = count()
-        codes = [composer.up(sys.argv[1]) for _ in range(5)]
+        codes = [composer.up(sys.argv[1]) for _ in range(3)]
         # A thread that has been joined may take a moment to leave the kernel's list.
         deadline = time.monotonic() + 20
         while any(now > then for now, then in zip(count(), before)):
@@ -781,8 +737,8 @@ def test_many_systems_in_a_row_leave_nothing_behind(compose, stubborn, scratch):
     *lines, last = result.stdout.splitlines()
     codes, before, after, left, threads = json.loads(last)
 
-    assert lines.count('[mission] done') == 6
-    assert codes == [0] * 5
+    assert lines.count('[mission] done') == 4
+    assert codes == [0] * 3
     assert all(now <= then for now, then in zip(after, before, strict=True)), (before, after)
     assert left == []
     assert threads == 1

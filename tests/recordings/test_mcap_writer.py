@@ -65,7 +65,7 @@ def test_a_full_disk_leaves_the_chunks_before(tmp_path):
     size = path.stat().st_size
     counts = set()
     # Smaller ones have no room for anything but the header.
-    for room in range(100, size, 7):
+    for room in range(100, size, 13):
         written = write(path, room)
         recording = read_recording(path)
         times = [each.time_ns for each in recording.raw_messages()]

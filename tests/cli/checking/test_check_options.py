@@ -167,9 +167,8 @@ def test_a_terminal_gets_colours(run, tmp_path):
     assert '\x1b[31m\x1b[1merror[bad-name]\x1b[0m' in in_a_terminal(tmp_path)
 
 
-@pytest.mark.parametrize('variables', [{'NO_COLOR': '1'}, {'TERM': 'dumb'}])
-def test_a_terminal_that_wants_no_colours_gets_none(run, tmp_path, variables):
-    written = in_a_terminal(tmp_path, **variables)
+def test_a_terminal_that_wants_no_colours_gets_none(run, tmp_path):
+    written = in_a_terminal(tmp_path, NO_COLOR='1')
     assert 'error[bad-name]' in written
     assert '\x1b' not in written
 
@@ -183,11 +182,6 @@ def test_warnings_count_when_that_is_asked_for(run):
     assert out.startswith('warned.yaml:2:31: warning[unused-ignore]: ')
     assert run('warned.yaml', '--strict')[0] == 1
     assert run('right.yaml', '--strict')[0] == 0
-
-
-def test_errors_and_warnings_are_counted_apart(run):
-    _, _, err = run('warned.yaml', 'invalid.yaml')
-    assert err == '2 errors and 1 warning in 2 files\n'
 
 
 def test_ignored_rules_are_left_out(run):
@@ -278,29 +272,11 @@ def test_an_import_leaves_nothing_behind(imports):
     assert (code, out) == (0, 'rover.yaml: ok, 1 node\n')
 
 
-@pytest.mark.parametrize(
-    'code',
-    [
-        'raise SystemExit(7)',
-        'try: import no_such_module\nfinally: pass',
-        'raise RuntimeError',
-        '1 / 0',
-    ],
-)
+@pytest.mark.parametrize('code', ['raise SystemExit(7)', '1 / 0'])
 def test_an_import_that_fails_is_a_finding(imports, code):
     found, out, _ = imports('{on_start: driving:start}', f'{code}\n\ndef start(node): ...\n')
     assert found == 1
     assert "error[broken-behaviour]: importing 'driving' raised " in out
-
-
-def test_a_module_that_is_missing_is_told_once(run, imports):
-    node = '{on_start: driving:start, on_stop: driving:start}'
-    code = 'import json.decodr\n\ndef start(node): ...\n'
-    _, out, err = imports(node, code, '-q')
-    assert (out, err) == (run('rover.yaml', '-q')[1], '')
-    assert out.startswith(
-        "driving.py:1:8: error[missing-module]: there is no module 'json.decodr'"
-    )
 
 
 def test_an_error_is_not_found_twice(imports):

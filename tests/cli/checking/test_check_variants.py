@@ -53,16 +53,11 @@ def places(out):
         (['base.yaml', 'other.yaml'], ['base.yaml: 1', 'other.yaml: 1']),
         (['other.yaml', '.'], ['other.yaml: 1', 'base.yaml: 1']),
         (['other.yaml', 'layer.yaml'], ['other.yaml (layer.yaml): 2']),
-        (
-            ['other.yaml', 'layer.yaml', 'other.yaml', 'base.yaml'],
-            ['other.yaml (layer.yaml): 2', 'other.yaml: 1', 'base.yaml: 1'],
-        ),
         (['base.yaml', 'robot:=truck'], ['base.yaml (robot:=truck): 2']),
         (['base.yaml', '2.0', 'truck'], ['base.yaml (2.0 truck): 2']),
         (['base.yaml', 'other.yaml', 'robot:=cart'], ['base.yaml (other.yaml robot:=cart): 2']),
         (['other.yaml', '--set', 'nodes={}'], ['other.yaml (--set nodes={}): 0']),
         (['other.yaml', 'layer.yaml', '--skip-other-files'], ['other.yaml: 1']),
-        (['base.yaml', '--set', 'args.speed=-2.0'], ['base.yaml (--set args.speed=-2.0): 1']),
     ],
 )
 def test_what_is_deployed_is_what_is_checked(run, words, checked):
@@ -106,7 +101,6 @@ def test_a_layer_has_keys_of_a_system_but_no_version(run, text, is_layer):
         (['other.yaml', '--set', 'x'], "--set x: 'x' sets nothing"),
         (['.', 'robot:=cart'], "'.' is a folder, and a system is one file\n  help: it holds\n"),
         (['base.yaml', 'robot:=cart', '--matrix', 'm.yaml'], '--matrix cannot be used together'),
-        (['base.yaml', '--strct'], "no such option '--strct'. Did you mean '--strict'?"),
         ([], "missing argument 'FILE'"),
     ],
 )
@@ -171,17 +165,11 @@ def test_a_comment_that_silences_something_in_one_combination_is_used(run):
     [
         ('{args: {robt: cart}}', "1:12: error[unknown-argument]: there is no argument 'robt'"),
         ('{args: {robot: car}}', "1:19: error[argument-type]: 'robot': 'car' is not one of"),
-        ('{args: {robot: cart, speed: x}}', "1:32: error[argument-type]: 'speed': expected a dou"),
         ('{}', "1:1: error[missing-argument]: 'a' does not give the argument 'robot'"),
-        ('{args: {robot: [cart]}}', '1:19: error[wrong-type]: '),
         ('{arg: {robot: cart}}', "1:5: error[unknown-key]: unknown key 'arg'"),
-        ('3', '1:4: error[wrong-type]: expected a mapping, got 3'),
         ('{layers: [sit.yaml]}', "1:14: error[bad-combination]: there is no file 'sit.yaml'"),
         ('{layers: [/etc/passwd]}', "1:14: error[bad-combination]: '/etc/passwd' lies outside of"),
         ('{set: {nodes.x.y: 1}}', "1:11: error[bad-combination]: there is no 'x' in nodes"),
-        ('{set: {"": 1}}', '1:11: error[bad-combination]: the path is empty'),
-        ('{layers: ["\\0"]}', '1:14: error[bad-combination]: no file has a null character'),
-        ('{set: {version: 2}}', '1:20: error[unsupported-version]: '),
     ],
 )
 def test_an_error_in_a_matrix_has_its_place(run, combination, finding):
@@ -200,7 +188,7 @@ def test_of_too_many_combinations_the_first_are_checked(run):
     assert err == '1 error in 1 file, 100 combinations checked\n'
 
 
-@pytest.mark.parametrize('text', ['', '- a', 'a: ['])
+@pytest.mark.parametrize('text', ['', 'a: ['])
 def test_a_matrix_that_cannot_be_read_is_a_finding(run, text):
     code, out, _ = run('base.yaml', '--matrix', 'm.yaml', m=text)
     assert code == 1

@@ -142,7 +142,7 @@ def test_what_cannot_be_asked_is_told(composer, domain_id, name):
 
 def test_external_processes_are_listed_and_restarted(compose, composer, wait_for):
     """One that has failed for good is no healthy system, until it is restarted."""
-    busy = 'trap exit INT TERM; while :; do n=0; while [ $n -lt 9999 ]; do n=$((n+1)); done; sleep 0.1; done & wait'
+    busy = 'trap exit INT TERM; while :; do n=0; while [ $n -lt 2999 ]; do n=$((n+1)); done; sleep 0.1; done & wait'
     failing = 'while [ ! -e mended ]; do exit 3; done; sleep 3600'
     text = SYSTEM.replace('0.5', '20') + (
         'processes:\n'
@@ -157,10 +157,10 @@ def test_external_processes_are_listed_and_restarted(compose, composer, wait_for
         (system,) = json.loads(composer('ps', '--format', 'json')[1])['systems']
         return system['health'], {each['name']: each for each in system['external_processes']}
 
-    wait_for(
-        lambda: ask()[1]['driver']['state'] == 'failed' and ask()[1]['busy']['cpu'], 'the end'
-    )
+    child.wait_for_line("process 'driver' has ended with exit code 3, and was started again")
+    wait_for(lambda: ask()[1]['busy']['cpu'], 'what is used')
     health, processes = ask()
+    assert processes['driver']['state'] == 'failed'
     message = "process 'driver': it has ended with exit code 3"
     assert health == {'level': 'error', 'message': message}
     assert [processes['driver'][key] for key in ('pid', 'restarts')] == [None, 1]

@@ -47,13 +47,14 @@ def snapshot_of(path):
     return take_snapshot(create_context(system, InterfaceCatalogue()))
 
 
-@pytest.mark.parametrize('path', sorted((ROOT / 'configs').glob('*.yaml')), ids=lambda p: p.stem)
-def test_a_snapshot_is_the_same_after_its_journey(path, monkeypatch):
+@pytest.mark.parametrize('name', ['robot', 'cell', 'patrol', 'sensors', 'self_contained'])
+def test_a_snapshot_is_the_same_after_its_journey(name, monkeypatch):
     monkeypatch.chdir(ROOT)
-    snapshot = snapshot_of(Path('configs', path.name))
+    path = Path('configs', f'{name}.yaml')
+    snapshot = snapshot_of(path)
     sent = json.loads(json.dumps(encode_snapshot(snapshot)))
     here = decode_snapshot(sent)
-    again = decode_snapshot(encode_snapshot(snapshot_of(Path('configs', path.name))))
+    again = decode_snapshot(encode_snapshot(snapshot_of(path)))
     assert not compare(here, again)
     assert repr(here.spec.nodes) == repr(snapshot.spec.nodes)
     assert [*here.spec.nodes] == [*snapshot.spec.nodes]

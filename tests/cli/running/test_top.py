@@ -191,18 +191,6 @@ def check_lines(entities, more, width, sort):
         assert [header, *lines] == render_entities(entities)
 
 
-def test_names_that_differ_in_their_middle_are_told_apart_if_there_is_room():
-    entities = [
-        entity(f'/robot/{place}_wheel', 'cmd_vel', kind='subscription', cpu=0.1)
-        for place in ('front_left', 'front_right', 'rear_left', 'rear_right')
-    ]
-    for width, sort in product([*range(1, 28), 80], SORT_NAMES):
-        lines = render_entities(entities, sort, width)
-        assert max(map(len, lines)) <= width
-        assert len(lines) == 1 + len(entities)
-        assert width < 80 or len(set(lines)) == len(lines)
-
-
 def process(worker='', **figures):
     waits = {'gil_wait_mean_ms': 1.25, 'gil_wait_max_ms': 20.0}
     return {'worker': worker, 'pid': 1, 'cpu': 1.0, **waits, **figures}
@@ -356,7 +344,7 @@ def test_the_screen_sorts_filters_and_resizes(compose, terminal, wait_for):
 
 
 @pytest.mark.parametrize(
-    ('terminal', 'answer'), [('xterm', 'True'), ('dumb', 'False'), ('no-such-terminal', 'False')]
+    ('terminal', 'answer'), [('xterm', 'True'), ('no-such-terminal', 'False')]
 )
 def test_there_is_a_screen_where_the_terminal_can_draw_one(monkeypatch, terminal, answer):
     # A process learns about its terminal once.

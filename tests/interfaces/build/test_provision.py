@@ -174,18 +174,6 @@ def test_an_interrupted_build_leaves_nothing(
     assert [path.suffix for path in cache.iterdir()] == ['.lock']
 
 
-def test_without_a_compiler_the_error_says_what_to_install(
-    run_python: RunPython,
-    write_definitions: WriteDefinitions,
-    tmp_path: Path,
-) -> None:
-    run = run_python(PROVIDE, 'robots', write_definitions(ROBOTS), cache=tmp_path, PATH='/none')
-    assert run.stderr.splitlines()[-1] == (
-        'composer.interfaces.build.toolchain.BuildToolsMissingError: interface packages cannot be '
-        'built: there is no C compiler, no C++ compiler'
-    )
-
-
 def test_an_installed_package_is_used(write_definitions: WriteDefinitions) -> None:
     folder = write_definitions({'msg/Empty.msg': '# Nothing.\n'})
     [provided] = provide_packages([load_definitions('std_msgs', folder)], silent)

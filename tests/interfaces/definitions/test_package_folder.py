@@ -127,14 +127,6 @@ def test_a_duplicate_shows_the_first_one(write_definitions: WriteDefinitions) ->
     ]
 
 
-def test_a_missing_separator_says_what_was_expected(write_definitions: WriteDefinitions) -> None:
-    folder = write_definitions({'action/Go.action': 'int32 a\n---\nint32 b\n'})
-    [diagnostic] = load_definitions('robots', folder).diagnostics
-    assert diagnostic.message == (
-        "expected 2 lines '---' between goal, result and feedback, found 1"
-    )
-
-
 def test_text_that_is_not_utf_8_is_found_on_its_line(tmp_path: Path) -> None:
     (tmp_path / 'msg').mkdir()
     (tmp_path / 'msg' / 'Robot.msg').write_bytes(b'int32 a\nint32 b # \xff\n')
