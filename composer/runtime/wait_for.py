@@ -5,8 +5,9 @@ The graph is only queried while something waits, at most twenty times a second.
 
 from __future__ import annotations
 
-import threading
+from contextlib import suppress
 from functools import partial
+from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -125,10 +126,11 @@ class WaitingStarter:
         if not pending:
             return
         node = create_graph_node(self._context)
-        woken = threading.Event()
+        # The handler of a signal wakes it, in this thread: no lock of `threading` may be held.
+        woken: SimpleQueue[None] = SimpleQueue()
         begun = monotonic()
         try:
-            with stop.waking(woken.set):
+            with stop.waking(partial(woken.put, None)):
                 while pending and not stop.is_set:
                     if is_outdated():
                         message = f'{pending[0].label}: the files have changed while it waited'
@@ -138,7 +140,8 @@ class WaitingStarter:
                         each for each in pending if each not in started and each.is_wanted()
                     ]
                     if not started:
-                        woken.wait(_POLL_SEC)
+                        with suppress(Empty):
+                            woken.get(timeout=_POLL_SEC)
         finally:
             self._executor.remove_node(node)
             self._remotes.clear()

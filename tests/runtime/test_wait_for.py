@@ -1,7 +1,11 @@
 """`wait_for`: nodes and processes start in the order that they ask for, without any sleep."""
 
 import sys
+import threading
+from itertools import count
+from math import inf
 from textwrap import dedent
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,6 +14,10 @@ pytest.importorskip('rclpy')
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+import composer.runtime.wait_for as wait_for_module
+from composer.language.specs import ConditionSpec
+from composer.runtime.stop_request import StopRequest
+from composer.runtime.wait_for import Waiter, WaitingStarter
 from tests.running import DEADLINE_SEC
 
 pytestmark = pytest.mark.ros
@@ -359,3 +367,30 @@ def test_nodes_of_one_name_in_two_namespaces_both_start_and_stop(compose):
         '[INFO] [left.arm]: stops',
         '[INFO] [right.arm]: stops',
     ]
+
+
+def test_a_signal_ends_the_wait_at_any_line(context, executor):
+    condition = ConditionSpec('topic', '/words', inf, None, ('nodes', 'late', 'wait_for'))
+    waiter = Waiter(
+        "node 'late'", (condition,), 0.0, lambda each: each.name, print, print, lambda: True
+    )
+    elsewhere = SimpleNamespace(find_hidden=frozenset)
+
+    def wait(ends):
+        """Wait until the handler of a signal runs, which does so between two lines."""
+        stop, lines = StopRequest(), count()
+
+        def trace(frame, event, _argument):
+            is_of_wait = frame.f_globals['__name__'] in {'threading', wait_for_module.__name__}
+            if is_of_wait and event == 'line' and next(lines) == ends:
+                stop.make()
+            return trace
+
+        sys.settrace(trace)
+        WaitingStarter(context, executor, {}, elsewhere, None).start_all([waiter], stop)
+
+    for ends in range(50, 110):
+        thread = threading.Thread(target=wait, args=(ends,), daemon=True)
+        thread.start()
+        thread.join(DEADLINE_SEC)
+        assert not thread.is_alive(), ends

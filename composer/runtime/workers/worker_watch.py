@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _PERIOD_SEC = 1.0
 _SILENT_SEC = 5.0
+# It prints stacks, at most, which may take as long as nobody reads them.
+_JOIN_SEC = 1.0
 
 
 class WorkerWatch:
@@ -39,8 +41,10 @@ class WorkerWatch:
         self._thread.start()
 
     def stop(self) -> None:
-        """Ask no more."""
+        """Ask no more, and wait until the thread has ended."""
         self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join(_JOIN_SEC)
 
     def _run(self) -> None:
         while not self._ended.wait(_PERIOD_SEC):

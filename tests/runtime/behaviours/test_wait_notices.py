@@ -71,7 +71,7 @@ def test_what_is_waited_for_is_named_once_and_no_stack_is_shown(compose):
         "[composer]: process 'viewer': Waiting for action server '/spin'…",
     ):
         child.wait_for_line(f'[INFO] {line}')
-    assert child.stop(once_up=False) == 130
+    assert child.stop(once_up=False) == 130, child.output
     assert len(child.matching('Waiting for')) == 9
     assert not child.matching('has been running')
     assert not child.matching('Traceback')
