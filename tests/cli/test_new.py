@@ -189,7 +189,7 @@ def test_a_name_is_one_of_a_ros_package(folder, capsys, name, near):
     assert not list(folder.iterdir())
 
 
-@pytest.mark.parametrize('name', ['', '.', '7'])
+@pytest.mark.parametrize('name', ['', '7'])
 def test_a_name_without_any_letter_has_none_near(folder, capsys, name):
     assert run(['new', name]) == 2
     assert 'help' not in capsys.readouterr().err

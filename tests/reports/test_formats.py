@@ -15,7 +15,7 @@ import composer
 from composer.diagnostics import relative_path
 from composer.reports import FORMATS, render_report
 from composer.reports.report import Attempt, CheckedFile, Report
-from composer.reports.text import render_case, render_files
+from composer.reports.text import render_files
 from tests.reports.reported import (
     CHECK,
     ERROR,
@@ -252,13 +252,6 @@ def test_a_shuffled_failure_shows_both_orders_and_how_to_have_it_again():
     assert 'the default order:\n  > 1 s a\n' in text
     command = 'tests/rover.scenario.yaml::stops --seed 5 --shuffle 1 --real-time-limit 5\n'
     assert f'to run this case again: composer test {command}' in text
-
-
-def test_other_orders_that_pass_are_counted():
-    line = render_case(case(PASSED, attempts=(Attempt(PASSED), Attempt(PASSED, ('x',)))))
-    assert line.endswith(
-        'PASSED [0.37 s, 10 s simulated] (2 other orders tried, 1 with other events)'
-    )
 
 
 def test_names_that_a_shell_would_split_are_quoted():

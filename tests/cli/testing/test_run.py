@@ -59,7 +59,6 @@ def test_the_default_is_what_lies_under_tests(project, capsys):
     [
         (['-k', 'not miscounts'], {'counts': 'passed'}),
         (['-x'], {'miscounts': 'failed'}),
-        (['--jobs', '2'], {'miscounts': 'failed', 'counts': 'passed'}),
     ],
 )
 def test_options_choose_cases(project, run_json, words, outcomes):
@@ -101,9 +100,11 @@ def test_the_trace_is_the_same_each_time_whatever_the_machine_says(project, monk
     assert '0.500000000 message /worker /out {data: 1}' in lines
 
 
-def test_a_junit_report_is_written(project):
+def test_a_junit_report_of_cases_that_run_at_once_is_written(project, run_json):
     project.scenario(FAILING)
-    assert run(['test', '--junit', 'report.xml', '-q']) == 1
+    code, report = run_json('--jobs', '2', '--junit', 'report.xml')
+    outcomes = {case['case']: case['outcome'] for case in report['cases']}
+    assert (code, outcomes) == (1, {'miscounts': 'failed', 'counts': 'passed'})
     (suite,) = ET.parse('report.xml').getroot()
     assert [(case.get('name'), case.find('failure') is None) for case in suite] == [
         ('miscounts', False),

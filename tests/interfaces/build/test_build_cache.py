@@ -19,7 +19,7 @@ from composer.interfaces.build.build_cache import (
     list_built,
     provide_cached,
 )
-from composer.interfaces.build.manifest import UntrustedFolderError, write_manifest
+from composer.interfaces.build.manifest import write_manifest
 from composer.interfaces.definitions.package_folder import PackageDefinitions, load_definitions
 
 
@@ -138,10 +138,9 @@ def test_a_cache_that_search_paths_cannot_name_is_an_error(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize('number', [errno.ENOSPC, errno.EDQUOT])
-def test_a_full_disk_is_called_that(home: Path, number: int) -> None:
+def test_a_full_disk_is_called_that(home: Path) -> None:
     def fail(_: BuildFolder) -> None:
-        raise OSError(number, os.strerror(number))
+        raise OSError(errno.ENOSPC, 'No space left on device')
 
     with pytest.raises(CacheError) as caught:
         provide('one', fail)
@@ -149,31 +148,20 @@ def test_a_full_disk_is_called_that(home: Path, number: int) -> None:
     assert caught.value.help == 'make room there, or name another folder in XDG_CACHE_HOME'
 
 
-@pytest.mark.parametrize('damage', ['empty folder', 'cut off', 'a file', 'a link to nowhere'])
+@pytest.mark.parametrize('damage', ['empty folder', 'cut off'])
 def test_a_damaged_build_is_built_again(home: Path, damage: str) -> None:
     place = provide('one', build)
     if damage == 'cut off':
         os.truncate(place / 'file', 3)
     else:
         shutil.rmtree(place)
-    if damage == 'empty folder':
         place.mkdir()
-    elif damage == 'a file':
-        place.touch()
-    elif damage == 'a link to nowhere':
-        place.symlink_to('nowhere')
     lines: list[str] = []
     assert provide('one', build, lines.append) == place
     assert lines == ['the build in the cache is damaged']
     assert provide('one', refuse) == place
     assert (place / 'file').read_text() == 'built'
     assert sorted(path.name for path in home.iterdir()) == ['one', 'one.lock']
-
-
-def test_a_build_that_others_can_change_is_refused(home: Path) -> None:
-    (provide('one', build) / 'file').chmod(0o666)
-    with pytest.raises(UntrustedFolderError):
-        provide('one', refuse)
 
 
 def test_of_several_builds_the_last_used_is_listed(home: Path) -> None:
