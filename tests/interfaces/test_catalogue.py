@@ -121,16 +121,6 @@ def test_added_descriptions_count_before_installed_ones(prefix: Path) -> None:
     assert catalogue.names('msg', 'my_msgs').count('my_msgs/msg/Number') == 1
 
 
-def test_added_descriptions_are_listed(tmp_path: Path) -> None:
-    catalogue = InterfaceCatalogue([tmp_path])
-    assert not catalogue.available
-    catalogue.add(NUMBER)
-    assert catalogue.available
-    assert catalogue.packages() == ['my_msgs']
-    assert catalogue.names('msg') == catalogue.names('msg', 'my_msgs') == ['my_msgs/msg/Number']
-    assert catalogue.names('msg', 'your_msgs') == catalogue.names('srv') == []
-
-
 def test_without_ros_there_is_nothing_and_that_is_no_error(tmp_path: Path) -> None:
     catalogue = InterfaceCatalogue([tmp_path / 'missing'])
     assert not catalogue.available
@@ -148,22 +138,6 @@ def test_every_installed_interface_is_described() -> None:
             assert isinstance(catalogue.describe(name), record), name
             described += 1
     assert described > 100
-
-
-@pytest.mark.ros
-def test_an_installed_service_is_described_by_its_parts() -> None:
-    trigger = InterfaceCatalogue().describe('std_srvs/srv/Trigger')
-    assert trigger == ServiceDescription(
-        'std_srvs/srv/Trigger',
-        MessageDescription('std_srvs/srv/Trigger_Request', ()),
-        MessageDescription(
-            'std_srvs/srv/Trigger_Response',
-            (
-                FieldDescription('success', FieldType('bool')),
-                FieldDescription('message', FieldType('string')),
-            ),
-        ),
-    )
 
 
 @pytest.mark.ros

@@ -1,6 +1,6 @@
 from collections import deque
 from enum import IntEnum
-from math import inf, isnan, nan
+from math import inf
 
 import pytest
 
@@ -78,13 +78,6 @@ def test_an_integer_becomes_a_float_where_one_is_wanted(kind: str, value: float)
     read = scalar_reader(FieldType(kind))(value)
     assert read == value
     assert type(read) is float
-
-
-@pytest.mark.parametrize('kind', ['float32', 'float64'])
-def test_nan_is_a_float(kind: str) -> None:
-    read = scalar_reader(FieldType(kind))(nan)
-    assert isinstance(read, float)
-    assert isnan(read)
 
 
 def test_a_finite_float_must_fit_its_width() -> None:

@@ -48,11 +48,6 @@ def test_a_wrong_value_is_a_finding(type_text: str, text: str, message: str) -> 
     assert str(caught.value) == message
 
 
-def test_a_unit_stays_in_the_comment() -> None:
-    message = parse_message('p', 'p/msg/M', 'float64 a  # The speed [m/s]\n')
-    assert message.fields[0].comment == 'The speed [m/s]'
-
-
 def test_a_wrong_message_is_a_finding_and_prints_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
