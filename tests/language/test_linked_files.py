@@ -82,7 +82,7 @@ def linked(request, tmp_path):
     return tmp_path / file
 
 
-@pytest.mark.parametrize('folder', ['.', 'real', 'real/configs', '/'])
+@pytest.mark.parametrize('folder', ['.', '/'])
 def test_all_relative_paths_lie_beside_the_file(linked, tmp_path, monkeypatch, folder):
     monkeypatch.chdir(tmp_path / folder)
     assert api.check(linked) == []
