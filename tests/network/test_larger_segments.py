@@ -49,6 +49,7 @@ CAMERA_NODES = """
     subscriptions:
       image: {type: std_msgs/msg/String, topic: image, qos: sensor_data, behaviour: parts:see}
 """
+CAMERA = f'version: 1\nnodes:{CAMERA_NODES}'
 EYE = """
 version: 1
 nodes:
@@ -129,11 +130,13 @@ def test_the_room_that_is_checked_is_what_the_profile_takes():
 
 
 @pytest.mark.ros
-def test_large_messages_of_best_effort_cross_between_workers_of_an_edit(compose):
-    child = compose(EYE, CODE, '--watch')
+@pytest.mark.parametrize('are_added', [False, True], ids=['at the start', 'by an edit'])
+def test_large_messages_of_best_effort_cross_between_workers(compose, are_added):
+    child = compose(EYE if are_added else CAMERA, CODE, '--watch')
     child.wait_until_ready()
-    compose.write(f'{EYE}{CAMERA_NODES}{HEARS_EYE}', CODE)
-    child.wait_for_line('network: the process of the system has little shared memory')
+    if are_added:
+        compose.write(f'{EYE}{CAMERA_NODES}{HEARS_EYE}', CODE)
+        child.wait_for_line('network: the process of the system has little shared memory')
     line = child.wait_for_line('detector has')
     assert child.stop() == 0
     # The first that arrives, and 39 more were sent.
