@@ -36,7 +36,7 @@ _STATUS_PERIOD_SEC = 2.0
 _POLL_SEC = 0.1
 # Who has asked so recently looks at the answer.
 _LOOK_SEC = 5.0
-# While nobody looks, the system is asked as seldom.
+# While nobody looks, it is asked as seldom, and not for its health, which it would measure.
 _IDLE_SEC = 10.0
 _MOST_LINES = 500
 _LONGEST_LINE = 2000
@@ -131,6 +131,7 @@ class WatchedSystem:
 
     def _follow(self, client: Client, system: RunningSystem, status: Any, health: Any) -> None:
         said: dict[str, Any] = {}
+        found: dict[str, Any] = {}
         next_status = 0.0
         while not self._ended.is_set():
             begun = monotonic()
@@ -144,12 +145,9 @@ class WatchedSystem:
                 self._find_outside(client, said)
             if self._saved:
                 self._saved.look()
-            try:
-                found = read_health(health(STATUS_SEC))
-            except ComposerError as error:
-                # As where `diagnostics: false` measures nothing.
-                found = {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
-            self._note_heard(said, found)
+            if not found or self._is_looked_at():
+                found = self._read_health(health)
+                self._note_heard(said, found)
             outside = self._outside.by_topic
             topics = self.drawing.topic_of_ends if self.drawing else {}
             self.state = self.state | {
@@ -165,8 +163,18 @@ class WatchedSystem:
             # A silent worker takes a second of the pause: the others do not seem old for it.
             self._spin(client, max(begun + found['period_sec'] / 2, monotonic() + _POLL_SEC))
             idle_until = monotonic() + _IDLE_SEC
-            while self.looked_at + _LOOK_SEC < monotonic() < idle_until:
+            while not (self._is_looked_at() or self._ended.is_set() or monotonic() > idle_until):
                 self._spin(client, monotonic() + _POLL_SEC)
+
+    def _is_looked_at(self) -> bool:
+        return monotonic() < self.looked_at + _LOOK_SEC
+
+    def _read_health(self, ask: Any) -> dict[str, Any]:
+        try:
+            return read_health(ask(STATUS_SEC))
+        except ComposerError as error:
+            # As where `diagnostics: false` measures nothing.
+            return {'entities': [], 'period_sec': 1.0, 'problem': str(error)}
 
     def _note_heard(self, said: dict[str, Any], found: dict[str, Any]) -> None:
         """Add to each entity when it was `heard`; those of a silent worker stay as they were."""

@@ -21,6 +21,8 @@ pytest.importorskip('uvicorn')
 
 import rclpy
 
+from composer.application.running_systems.health import read_health
+from composer.page import watched_system
 from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
@@ -64,6 +66,7 @@ class Page:
     """A page that is served, and its cookie."""
 
     def __init__(self, domain_id, *words, folder=None):
+        self.domain_id = domain_id
         environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'composer', 'page', '--no-browser', *words],
@@ -221,6 +224,32 @@ def test_a_question_that_somebody_gave_up_keeps_no_other_from_an_answer(domain_i
     source.start()
     try:
         assert asked.result(DEADLINE_SEC) == domain_id
+    finally:
+        source.stop()
+
+
+def test_while_nobody_looks_the_system_measures_nothing(page, monkeypatch):
+    asked = []
+
+    def read_and_note(answer):
+        asked.append(answer)
+        return read_health(answer)
+
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(page.domain_id))
+    monkeypatch.setattr(watched_system, 'read_health', read_and_note)
+    for name in ('_IDLE_SEC', '_STATUS_PERIOD_SEC'):
+        monkeypatch.setattr(watched_system, name, 0.1)
+    source = WatchedSystem('system')
+    source.start()
+    try:
+        wait_for(lambda: len(asked) > 1, 'two looks at the health')
+        source.looked_at = float('-inf')
+        before = len(asked)
+        heard = set()
+        wait_for(lambda: heard.add(source.state['status']['heard']) or len(heard) > 3, 'status')
+        assert len(asked) <= before + 1
+        source.looked_at = float('inf')
+        wait_for(lambda: len(asked) > before + 2, 'the health again')
     finally:
         source.stop()
 
