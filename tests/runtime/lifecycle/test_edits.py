@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 
-from tests.running import ROOT
+from tests.running import ROOT, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -119,8 +119,9 @@ def test_an_edit_that_cannot_come_back_to_its_state_is_undone(compose, peer):
     )
     child.wait_for_line("node 'lidar': on_activate returned False")
     child.wait_for_line('[lidar]: activated', times=2)
-    child.wait_for_line('[lidar]: tick')
-    assert state_of(peer) == 'active'
+    ticks = len(child.matching('[lidar]: tick'))
+    wait_for(lambda: state_of(peer) == 'active', 'the state of before')
+    child.wait_for_line('[lidar]: tick', times=ticks + 1)
     assert child.stop() == 0
 
 
