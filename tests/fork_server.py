@@ -1,11 +1,13 @@
 """Starts `python -m composer` by a fork of a process that has imported what each start imports.
 
 Imports are half of the work of a start, and tests start Composer hundreds of times. What is forked
-has imported rclpy, which starts no thread by that, but only for a child with the variables of ROS
-that the tests have; and nothing of Composer that minds forks: that is left to the child. All else is as in a new process: the command
-line, the folder, the environment, the descriptors, the ignored signals, and how it exits.
+has imported all that a system needs, and has begun nothing: no thread, and no context of ROS. What
+reads the variables of ROS is there only for a child with those that the tests have. All else is as
+in a new process: the command line, the folder, the environment, the descriptors, the ignored
+signals, and how it exits.
 """
 
+import ctypes
 import gc
 import importlib.util
 import inspect
@@ -26,8 +28,24 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _READ_ONCE = ('PYTHON', 'LANG', 'LC_', 'LD_', 'OMP_', 'OPENBLAS_', 'NPY_')
 # ROS may read one of these when it is imported; the others are read when a context begins.
 _OF_ROS = ('ROS', 'RMW_', 'RCUTILS_', 'RCL', 'AMENT_', 'FASTRTPS_', 'FASTDDS_')
-_READ_LATER = ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_HOME')
-_IMPORTED_OF_ROS = ('rclpy', 'rclpy.action', 'rclpy.executors', 'rclpy.parameter_client')
+_READ_LATER = (
+    'RCUTILS_COLORIZED_OUTPUT',
+    'RCUTILS_CONSOLE_OUTPUT_FORMAT',
+    'ROS_DOMAIN_ID',
+    'ROS_HOME',
+    'ROS_LOG_DIR',
+)
+_IMPORTED_OF_ROS = (
+    'rclpy.action',
+    'rclpy.executors',
+    'rclpy.parameter_client',
+    'composer.runtime.run',
+    'composer.runtime.health.diagnostic_status',
+    'lifecycle_msgs.msg',
+    'rosidl_generator_py',
+    'std_msgs.msg',
+    'std_srvs.srv',
+)
 # What these import in turn is none of ROS.
 _IMPORTED = (
     'composer.checks.checker',
@@ -134,7 +152,9 @@ class ForkedProcess:
 
 def _warm_up():
     """Do once what each start does in the same way."""
-    importlib.import_module('composer.schema.structure').is_sound({})
+    structure = importlib.import_module('composer.schema.structure')
+    structure.is_sound({})
+    structure.known_keys('')
     # The first line of a log looks for the module of its caller among all modules.
     inspect.getframeinfo(sys._getframe())
     # What children share with this process is no garbage, and they need not look through it.
@@ -192,11 +212,19 @@ def _become(request, output):
     sys.argv[1:] = request['arguments']
     sys.orig_argv = [sys.executable, '-m', 'composer', *request['arguments']]
     del sys.modules['tests']
+    if children := sys.modules.get('composer.runtime.forked_children'):
+        # It takes this process for one that a behaviour forked.
+        children.in_child = False
+    # Libraries of C that were loaded before the fork had threads, which are not here: their
+    # destructors would end them. Those that are loaded from now on are destroyed before this.
+    libc = ctypes.CDLL(None)
+    for function in (libc._exit, libc.fcloseall):
+        libc.on_exit(function, None)
 
 
 if __name__ == '__main__':
-    of_ros = _IMPORTED_OF_ROS if sys.argv.pop() and importlib.util.find_spec('rclpy') else ()
-    for name in (*_IMPORTED, *of_ros):
+    has_ros = bool(sys.argv.pop() and importlib.util.find_spec('rclpy'))
+    for name in (*_IMPORTED, *(_IMPORTED_OF_ROS if has_ros else ())):
         importlib.import_module(name)
     _warm_up()
     _become(*_serve(int(sys.argv[1])))

@@ -132,7 +132,7 @@ class WatchedSystem:
     def _follow(self, client: Client, system: RunningSystem, status: Any, health: Any) -> None:
         said: dict[str, Any] = {}
         found: dict[str, Any] = {}
-        next_status = 0.0
+        next_status = next_health = 0.0
         while not self._ended.is_set():
             begun = monotonic()
             if begun >= next_status:
@@ -145,8 +145,10 @@ class WatchedSystem:
                 self._find_outside(client, said)
             if self._saved:
                 self._saved.look()
-            if not found or self._is_looked_at():
+            # Once a period: an answer of all entities is dear to the system.
+            if begun >= next_health and (not found or self._is_looked_at()):
                 found = self._read_health(health)
+                next_health = begun + found['period_sec']
                 self._note_heard(said, found)
             outside = self._outside.by_topic
             topics = self.drawing.topic_of_ends if self.drawing else {}
@@ -161,7 +163,7 @@ class WatchedSystem:
                 'next': self._saved and self._saved.next_plan,
             }
             # A silent worker takes a second of the pause: the others do not seem old for it.
-            self._spin(client, max(begun + found['period_sec'] / 2, monotonic() + _POLL_SEC))
+            self._spin(client, max(min(next_health, next_status), monotonic() + _POLL_SEC))
             idle_until = monotonic() + _IDLE_SEC
             while not (self._is_looked_at() or self._ended.is_set() or monotonic() > idle_until):
                 self._spin(client, monotonic() + _POLL_SEC)

@@ -56,7 +56,7 @@ def check_structure(document: Document) -> None:
     """
     positions, data = document.positions, document.data or {}
     failed = [_entry_of(path) for path in document.dropped]
-    if not failed and _schema().is_surely_valid(data):
+    if not failed and _schema(SCHEMA_NAME).is_surely_valid(data):
         document.data, document.dropped = data, set()
         return
     data = copy_data(data)
@@ -132,7 +132,7 @@ def _is_known(place: tuple[str, str]) -> bool:
 @cache
 def known_keys(definition: str) -> frozenset[str]:
     """Return the keys that a definition of the schema knows; those of a file for `''`."""
-    document = _schema().schema
+    document = _schema(SCHEMA_NAME).schema
     schema = document['$defs'][definition] if definition else document
     branches = (schema, *schema.get('oneOf', ()))
     return frozenset(key for branch in branches for key in branch.get('properties', ()))
@@ -269,7 +269,7 @@ def _child(data: Any, key: Key) -> Any:
 
 
 @cache
-def _schema(name: str = SCHEMA_NAME) -> SchemaValidator:
+def _schema(name: str) -> SchemaValidator:
     text = schema_path(name).read_text(encoding='utf-8')
     return SchemaValidator(without_templates(json.loads(text)))
 

@@ -321,8 +321,8 @@ class QosLosses:
         what = f'lost its liveliness: it published nothing within its lease of {lease_sec:g} s'
         self._report(what, event.total_count_change)
 
-    @checked_seldom
     def _on_changed_liveliness(self, event: Any) -> None:
+        # At once: of one that was lost and is back, the change is 0.
         lease_sec = self._policies['liveliness_lease_duration']
         what = f'lost a publisher: no sign of life within the lease of {lease_sec:g} s'
         self._report(what, event.not_alive_count_change)
