@@ -252,7 +252,9 @@ def test_findings_are_the_same_without_jsonschema_rs(monkeypatch):
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, 'jsonschema_rs', None)
         alone = find_all()
-        assert not structure._schema(structure.SCHEMA_NAME).is_surely_valid({'version': 1, 'nodes': {}})
+        assert not structure._schema(structure.SCHEMA_NAME).is_surely_valid(
+            {'version': 1, 'nodes': {}}
+        )
     structure._schema.cache_clear()
     assert alone == quick
     assert sum(map(len, quick)) > len(files) / 4
