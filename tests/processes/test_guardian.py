@@ -129,14 +129,14 @@ def test_silence_is_reported_unless_the_process_is_stopped(capfd, monkeypatch, w
     monkeypatch.setattr(guardian, '_LOOK_SEC', 0.01)
     looks, read_state = [], guardian._read_state
 
-    def note_look(folder):
-        looks.append(read_state(folder))
+    def note_look(pid):
+        looks.append(read_state(pid))
         return looks[-1]
 
     monkeypatch.setattr(guardian, '_read_state', note_look)
     with subprocess.Popen(['sleep', '1000']) as process:
         process.send_signal(signal.SIGSTOP)
-        wait_for(lambda: read_state(Path(f'/proc/{process.pid}')) == b'T', 'its stop')
+        wait_for(lambda: read_state(process.pid) == b'T', 'its stop')
         reports, descriptor = os.pipe()
         os.write(descriptor, bytes([guardian.BEAT]))
         watching = guardian.Guardian(os.pidfd_open(process.pid), reports, 1.0, 1.0)
