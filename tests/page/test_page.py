@@ -448,15 +448,16 @@ def find_all(browser, selector):
     return browser.find_elements('css selector', selector)
 
 
-def click(browser, selector):
-    """Click the first element as soon as there is one; lists are made anew all the time."""
+def click(browser, selector, text=''):
+    """Click the first element with a text as soon as there is one; lists are made anew again."""
     from selenium.common import StaleElementReferenceException
 
     def is_clicked():
         with suppress(StaleElementReferenceException):
-            for element in find_all(browser, selector)[:1]:
-                element.click()
-                return True
+            for element in find_all(browser, selector):
+                if text in element.text:
+                    element.click()
+                    return True
         return False
 
     wait_for(is_clicked, selector)
@@ -798,7 +799,7 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     wait_for(lambda: 'subscription words of /ear' in text_of('#problems'), 'the problem')
     wait_for(lambda: find('main svg .node.hurts, main svg .node.warns'), 'the node that hurts')
     # A click on the problem leads to its node, and the keyboard to another one.
-    click(browser, '#problems button')
+    click(browser, '#problems button', 'subscription words of /ear')
     wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the selection')
     assert browser.current_url.endswith('#node%3A%2Fear')
     wait_for(lambda: 'subscription words' in text_of('#live'), 'figures')
