@@ -1,10 +1,10 @@
 """Starts `python -m composer` by a fork of a process that has imported what each start imports.
 
 Imports are half of the work of a start, and tests start Composer hundreds of times. What is forked
-has imported all that a system needs, and has begun nothing: no thread, and no context of ROS. What
-reads the variables of ROS is there only for a child with those that the tests have. All else is as
-in a new process: the command line, the folder, the environment, the descriptors, the ignored
-signals, and how it exits.
+has imported all that a system needs, and has begun nothing: no thread of Python, and no context of
+ROS. What reads the variables of ROS is there only for a child with those that the tests have. All
+else is as in a new process: the command line, the folder, the environment, the descriptors, the
+ignored signals, and how it exits, but for libraries of C that were loaded before.
 """
 
 import ctypes
