@@ -326,6 +326,27 @@ class Peer:
         wait_for(all_done, f'the responses of {[client.srv_name for client in clients]}')
         return [call.result() for call in calls]
 
+    def change_state(self, node, *transitions):
+        """Have a node with a lifecycle make transitions."""
+        for transition in transitions:
+            assert self.transition(node, transition), f'{node} made no transition {transition}'
+
+    def transition(self, node, transition):
+        """Ask a node once for a transition, and return whether it made it.
+
+        To ask twice, as `call` does where an answer is lost, is to be refused. None is lost once
+        the node has found the client, as the answer to another one shows that was made later.
+        """
+        from lifecycle_msgs.msg import Transition
+        from lifecycle_msgs.srv import ChangeState, GetState
+
+        client = self.run(self.node.create_client, ChangeState, f'{node}/change_state')
+        self.call(GetState, f'{node}/get_state')
+        request = ChangeState.Request(transition=Transition(id=transition))
+        (response,) = self.call_by([client], request)
+        self.run(self.node.destroy_client, client)
+        return response.success
+
     def meet_action_server(self, name):
         """Return when the server of an action has found all ends that this peer has by now.
 

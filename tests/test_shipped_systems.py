@@ -16,7 +16,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Vector3
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -208,9 +208,8 @@ def test_the_managed_system_brings_the_scanner_up_and_waits_for_a_manager(
     wait_for(lambda: nearest, 'a distance')
     assert nearest[0].data == 1.0
     assert not kept
-    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-        request = Transition(id=transition)
-        assert peer.call(ChangeState, '/rover/mapper/change_state', transition=request).success
+    transitions = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE
+    peer.change_state('/rover/mapper', *transitions)
     child.wait_for_line('Hello map!')
     wait_for(lambda: kept, 'a scan of the mapper')
     assert child.stop() == 0

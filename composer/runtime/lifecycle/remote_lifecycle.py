@@ -37,10 +37,12 @@ class RemoteLifecycle:
     def __init__(self, ros: RosNode, name: str) -> None:
         group = ReentrantCallbackGroup()
         self._ros = ros
-        self._states = ros.create_client(GetState, f'{name}/get_state', callback_group=group)
+        # Made first: the node finds clients in their order, and one that it has not found waits in
+        # vain for its answer. A transition is asked for once a state has been told.
         self._changes = ros.create_client(
             ChangeState, f'{name}/change_state', callback_group=group
         )
+        self._states = ros.create_client(GetState, f'{name}/get_state', callback_group=group)
         self._known = ''
         self._pending: Future | None = None
         self._asked = 0.0

@@ -7,7 +7,6 @@ import pytest
 pytest.importorskip('rclpy')
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from std_msgs.msg import String
 
 pytestmark = pytest.mark.ros
@@ -157,17 +156,12 @@ def test_what_sources_give_is_published_and_they_rest_with_their_nodes(compose, 
 
     for _ in range(2):
         before = len(child.matching('ticks'))
-        change(peer, Transition.TRANSITION_ACTIVATE)
+        peer.change_state('/rests', Transition.TRANSITION_ACTIVATE)
         child.wait_for_line('ticks', times=before + 2)
-        change(peer, Transition.TRANSITION_DEACTIVATE)
+        peer.change_state('/rests', Transition.TRANSITION_DEACTIVATE)
     assert child.stop() == 0, child.output
     assert len(child.matching('closed step ')) == 2
     assert heard(child, 'one', 'last') == ['one', 'last']
-
-
-def change(peer, transition):
-    fields = {'transition': Transition(id=transition)}
-    assert peer.call(ChangeState, '/rests/change_state', **fields).success
 
 
 def test_edits_end_what_blocks_and_begin_it_anew(compose, peer):

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 
 from tests.running import ROOT, wait_for
 
@@ -31,11 +31,6 @@ nodes:
     on_activate: {behaviour: 'parts:tell', with: {text: activated}}
     on_deactivate: {behaviour: 'parts:tell', with: {text: deactivated}}
 """
-
-
-def change(peer, transition):
-    request = Transition(id=transition)
-    assert peer.call(ChangeState, 'lidar/change_state', transition=request).success
 
 
 def state_of(peer):
@@ -67,7 +62,7 @@ def ask(*arguments):
 def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
     child = compose(SYSTEM, CODE, '--watch')
     child.wait_until_ready()
-    change(peer, Transition.TRANSITION_CONFIGURE)
+    peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
     # While it rests: a timer that comes rests, too, and a behaviour is another one.
     edit(
         compose,
@@ -79,7 +74,7 @@ def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
         ('activated', 'up'),
     )
     assert not child.matching('[lidar]: t')
-    change(peer, Transition.TRANSITION_ACTIVATE)
+    peer.change_state('lidar', Transition.TRANSITION_ACTIVATE)
     assert child.matching('[lidar]: up')
     child.wait_for_line('[lidar]: tock', times=3)
     child.wait_for_line('[lidar]: tick', times=3)
@@ -109,8 +104,8 @@ def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
 def test_an_edit_that_cannot_come_back_to_its_state_is_undone(compose, peer):
     child = compose(SYSTEM, CODE, '--watch')
     child.wait_until_ready()
-    change(peer, Transition.TRANSITION_CONFIGURE)
-    change(peer, Transition.TRANSITION_ACTIVATE)
+    peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
+    peer.change_state('lidar', Transition.TRANSITION_ACTIVATE)
     path = compose.folder / 'system.yaml'
     text = path.read_text().replace('    lifecycle', '    remap: {a: b}\n    lifecycle')
     (compose.folder / 'parts.py').write_text(CODE + '\ndef refuse(node):\n    return False\n')
@@ -130,7 +125,7 @@ def test_the_state_is_shown(compose, peer):
     child.wait_until_ready()
     (system,) = ask('ps')['systems']
     assert system['lifecycles'] == {'/lidar': 'unconfigured'}
-    change(peer, Transition.TRANSITION_CONFIGURE)
+    peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
     rows = [each for each in ask('top', '--once')['entities'] if each['kind'] == 'lifecycle']
     assert [(each['node'], each['name']) for each in rows] == [('/lidar', 'inactive')]
     assert child.stop() == 0

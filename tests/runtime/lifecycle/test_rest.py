@@ -6,7 +6,7 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -69,14 +69,6 @@ CONFIGURE, ACTIVATE, DEACTIVATE = (
 )
 
 
-def lead(peer, *transitions, node='robot'):
-    for transition in transitions:
-        response = peer.call(
-            ChangeState, f'{node}/change_state', transition=Transition(id=transition)
-        )
-        assert response.success
-
-
 def test_timers_and_publishers_rest_until_active(compose, peer, wait_for):
     text = """
         version: 1
@@ -96,21 +88,21 @@ def test_timers_and_publishers_rest_until_active(compose, peer, wait_for):
     child.wait_until_ready()
     heard = peer.listen(String, 'words')
     wait_for(lambda: peer.node.count_publishers('words'), 'the publisher')
-    lead(peer, CONFIGURE)
+    peer.change_state('robot', CONFIGURE)
     child.wait_for_line("publisher 'words' drops what is published: the node is configuring")
     child.wait_for_line('[other]: tick', times=5)
     assert not child.matching('[robot]: tick')
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     child.wait_for_line('[robot]: tick', times=5)
     child.wait_for_line('[robot]: count 3')
-    lead(peer, DEACTIVATE)
+    peer.change_state('robot', DEACTIVATE)
     wait_for(lambda: heard and heard[-1].data == 'deactivated', 'the last message')
     child.wait_for_line('[robot]: counted to')
     ticks = len(child.matching('[robot]: tick'))
     child.wait_for_line('[other]: tick', times=len(child.matching('[other]: tick')) + 5)
     assert len(child.matching('[robot]: tick')) == ticks
     # What ended begins anew.
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     child.wait_for_line('[robot]: count 1', times=len(child.matching('[robot]: count 1')) + 1)
     assert {message.data for message in heard} == {'activated', 'tick', 'deactivated'}
     assert heard[0].data == 'activated'
@@ -158,11 +150,11 @@ def test_what_comes_meanwhile_is_dropped_or_kept(compose, peer, wait_for, local)
     assert client.wait_for_service(20.0)
     pending = client.call_async(Trigger.Request())
     child.wait_for_line('has sent round 1')
-    lead(peer, CONFIGURE)
+    peer.change_state('robot', CONFIGURE)
     assert not child.matching('[robot]: dropped')
     assert not child.matching('[robot]: kept')
     assert not pending.done()
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     wait_for(pending.done, 'the answer that was kept')
     child.wait_for_line('[robot]: kept 2 of 1')
     peer.call(Trigger, 'go')
@@ -192,11 +184,11 @@ def test_what_is_kept_as_told_is_no_problem(compose, peer, wait_for, local):
             if status.name == '/robot: subscription kept'
         ]
 
-    lead(peer, CONFIGURE)
+    peer.change_state('robot', CONFIGURE)
     for number in range(1, 4):
         peer.call(Trigger, 'go')
         child.wait_for_line(f'has sent round {number}')
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     wait_for(lambda: any(values['calls'] == '2' for _, values in told()), 'both calls')
     assert {(level, values['queue overruns']) for level, values in told()} == {
         (DiagnosticStatus.OK, '0')
@@ -216,7 +208,7 @@ def test_requests_are_refused_by_default(compose, peer):
     assert client.wait_for_service(20.0)
     unanswered = client.call_async(Trigger.Request())
     child.wait_for_line("service 'ask' answers no requests: the node is unconfigured")
-    lead(peer, CONFIGURE, ACTIVATE)
+    peer.change_state('robot', CONFIGURE, ACTIVATE)
     assert peer.call(Trigger, 'ask').success
     assert not unanswered.done()
     assert child.stop() == 0
@@ -241,7 +233,7 @@ def test_a_latched_message_is_kept(compose, peer):
     peer.advertise(String, 'map', qos).publish(String(data='of the house'))
     assert peer.call(GetState, 'robot/get_state').current_state.label == 'inactive'
     assert not child.matching('heard')
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     child.wait_for_line('heard of the house')
 
 
@@ -270,12 +262,12 @@ def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
         return sent.result()
 
     assert not send().accepted
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     goal = send()
     assert goal.accepted
     result = goal.get_result_async()
     child.wait_for_line('goal begins')
-    lead(peer, DEACTIVATE)
+    peer.change_state('robot', DEACTIVATE)
     wait_for(result.done, 'the result')
     assert result.result().status == GoalStatus.STATUS_ABORTED
     assert child.matching('[robot]: noted')
@@ -311,11 +303,11 @@ def other(node):
     """
     child = compose(text, code)
     child.wait_until_ready()
-    lead(peer, CONFIGURE)
+    peer.change_state('robot', CONFIGURE)
     child.wait_for_line('[other]: other', times=len(child.matching('[other]: other')) + 5)
     assert not child.matching('[robot]: tick')
     assert not child.matching('[robot]: heard')
-    lead(peer, ACTIVATE)
+    peer.change_state('robot', ACTIVATE)
     child.wait_for_line('[robot]: tick', times=3)
     child.wait_for_line('[robot]: heard x', times=3)
     assert child.stop() == 0

@@ -112,10 +112,6 @@ class Reference(LifecycleNode):
         return outcome if outcome == good else TransitionCallbackReturn.FAILURE
 
 
-def change(peer, node, transition):
-    return peer.call(ChangeState, f'{node}/change_state', transition=Transition(id=transition))
-
-
 def state_of(peer, node):
     return peer.call(GetState, f'{node}/get_state').current_state
 
@@ -148,8 +144,8 @@ def test_every_outcome_leads_where_it_does_with_rclpy(compose, peer, wait_for, i
         _set(peer, outcomes)
         reference.outcomes = outcomes
         for transition in [*BEFORE[key], OWN[key]]:
-            ours, theirs = (change(peer, node, transition) for node in ('camera', 'reference'))
-            assert ours.success == theirs.success, (key, outcome)
+            ours, theirs = (peer.transition(node, transition) for node in ('camera', 'reference'))
+            assert ours == theirs, (key, outcome)
             assert state_of(peer, 'camera') == state_of(peer, 'reference'), (key, outcome)
         _set(peer, dict.fromkeys(outcomes, 'ok'))
         reference.outcomes = {}
@@ -174,7 +170,7 @@ def _lead_back(peer):
     ways = {State.PRIMARY_STATE_ACTIVE: DEACTIVATE, State.PRIMARY_STATE_INACTIVE: CLEANUP}
     for node in ('camera', 'reference'):
         while (state := state_of(peer, node).id) in ways:
-            assert change(peer, node, ways[state]).success
+            assert peer.transition(node, ways[state])
 
 
 def test_what_is_possible_is_told_as_by_rclpy(compose, peer):
@@ -212,7 +208,7 @@ def test_a_transition_may_take_long_and_another_is_refused_meanwhile(compose, pe
     pending = client.call_async(ChangeState.Request(transition=Transition(label='configure')))
     child.wait_for_line('[camera]: begins')
     assert state_of(peer, 'camera').label == 'configuring'
-    assert not change(peer, 'camera', CONFIGURE).success
+    assert not peer.transition('camera', CONFIGURE)
     child.wait_for_line('is configuring: no other transition begins until that ends')
     child.wait_for_line('[other]: tick', times=len(child.matching('[other]: tick')) + 5)
     assert not pending.done()
@@ -220,7 +216,7 @@ def test_a_transition_may_take_long_and_another_is_refused_meanwhile(compose, pe
     wait_for(pending.done, 'the response')
     assert pending.result().success
     # From inactive nothing is deactivated, and whoever asks is told so.
-    assert not change(peer, 'camera', DEACTIVATE).success
+    assert not peer.transition('camera', DEACTIVATE)
     assert not child.matching('[INFO] [camera]: begins')[1:]
     assert state_of(peer, 'camera').label == 'inactive'
 

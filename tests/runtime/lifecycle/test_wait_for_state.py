@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import GetState
 
 from tests.running import ROOT
 
@@ -16,12 +16,6 @@ def tell(node):
     node.logger.info('starts')
 """
 PROGRAM = ROOT / 'tests/runtime/lifecycle/managed_program.py'
-
-
-def change(peer, node, transition):
-    assert peer.call(
-        ChangeState, f'{node}/change_state', transition=Transition(id=transition)
-    ).success
 
 
 @pytest.mark.parametrize('is_own', [True, False])
@@ -37,11 +31,11 @@ def test_a_node_starts_when_another_one_is_active(compose, peer, is_own, start_p
     if not is_own:
         start_program(PROGRAM, 'lidar')
     child = compose(text, CODE)
-    change(peer, 'lidar', Transition.TRANSITION_CONFIGURE)
+    peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
     child.wait_for_line("[late]: Waiting for node '/lidar' to be active")
     assert peer.call(GetState, 'lidar/get_state').current_state.label == 'inactive'
     assert not child.matching('[late]: starts')
-    change(peer, 'lidar', Transition.TRANSITION_ACTIVATE)
+    peer.change_state('lidar', Transition.TRANSITION_ACTIVATE)
     child.wait_for_line('[late]: starts')
     child.wait_until_ready()
     assert child.stop() == 0
