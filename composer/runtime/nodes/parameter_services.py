@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from rclpy.exceptions import InvalidHandle
 
+from composer.interfaces.classes import import_interface
 from composer.runtime.logs import system_logger
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
 
     from composer.runtime.nodes.live_node import LiveNode
 
+_TYPES = (
+    'DescribeParameters',
+    'GetParameterTypes',
+    'GetParameters',
+    'ListParameters',
+    'SetParameters',
+    'SetParametersAtomically',
+)
 # If the system is not ready by then: an `on_start` or a `wait_for` may wait for these services.
 _LATEST_SEC = 1.0
 # How much longer than the work each pause is.
@@ -48,6 +57,9 @@ class ParameterServiceStarter:
 
     def start(self) -> None:
         """Start to create services soon."""
+        # While a thread loads a type, rclpy takes it for loaded in all others.
+        for name in _TYPES:
+            import_interface(f'rcl_interfaces/srv/{name}')
         self._thread.start()
 
     def begin(self) -> None:

@@ -77,7 +77,11 @@ def block(node):
     threading.Event().wait()
 
 def announce(node):
-    node.logger.info('not a moment')
+    from rcl_interfaces.srv import GetParameters, ListParameters
+
+    # Two threads create services of these types, the first of which loads them.
+    loaded = [type(each)._TYPE_SUPPORT is not None for each in (GetParameters, ListParameters)]
+    node.logger.info('not a moment' if all(loaded) else 'types are not loaded')
 
 def live(node):
     node.state.ticks += 1
