@@ -1,6 +1,7 @@
 """A command finds what a system has, also if an answer is lost on the way."""
 
 import json
+from contextlib import contextmanager
 
 import pytest
 
@@ -11,13 +12,18 @@ from composer.application.running_systems.client import Client
 from composer.application.running_systems.discovery import Discovery
 from composer.errors import ComposerError
 from composer.runtime.control import protocol
+from composer.runtime.control.name_claim import NameClaim
 from tests.application.running_systems.test_answer_forms import STATUS_ANSWER
 
 pytestmark = pytest.mark.ros
 
 
-def answer_status(peer, name, *, after):
-    """Answer each but the first calls of a system's status; return the list of all calls."""
+@contextmanager
+def answering_status(peer, name, *, after):
+    """Answer each but the first calls of a system's status; yield the list of all calls.
+
+    It has its name on this host, so that it is looked for until it is found.
+    """
     from rclpy.callback_groups import ReentrantCallbackGroup
     from rclpy.task import Future
     from std_srvs.srv import Trigger
@@ -35,19 +41,20 @@ def answer_status(peer, name, *, after):
     service = f'/{protocol.node_name(name)}/{protocol.STATUS}'
     group = ReentrantCallbackGroup()
     peer.run(peer.node.create_service, Trigger, service, answer, callback_group=group)
-    return calls
+    claim = NameClaim(protocol.node_name(name), peer.context.get_domain_id())
+    claim.take({'name': name, 'is_asked': True})
+    yield calls
+    claim.release()
 
 
 def test_a_status_whose_answer_is_lost_is_asked_for_again(peer):
-    calls = answer_status(peer, 'arm', after=1)
-    with Client() as client:
+    with answering_status(peer, 'arm', after=1) as calls, Client() as client:
         assert Discovery(client).find('arm').status['nodes'] == ['/a']
     assert len(calls) >= 2
 
 
 def test_a_system_that_does_not_answer_may_have_the_node(peer):
-    answer_status(peer, 'arm', after=1000)
-    with pytest.raises(ComposerError) as error:
+    with answering_status(peer, 'arm', after=1000), pytest.raises(ComposerError) as error:
         restart('stuck')
     assert (
         str(error.value)
