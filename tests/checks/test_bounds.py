@@ -19,8 +19,6 @@ def check(text):
     ('text', 'rule'),
     [
         (HEAD + ''.join(f'    tmers{i}: 1\n' for i in range(COUNT)), 'unknown-key'),
-        ('version: 1\nnodes:\n' + ''.join(f'  n{i}: {{timrs: {{}}}}\n' for i in range(COUNT)), 'unknown-key'),
-        (HEAD + '    timers:\n' + ''.join(f'      t{i}: {{period: 1, behaviour: "no{i}:f"}}\n' for i in range(COUNT)), 'unknown-behaviour'),
         (HEAD + '    state: {' + ', '.join(f'a{i}: "{{{{ b }}}}"' for i in range(COUNT)) + '}\n', 'undefined-name'),
         ('version: 1\nqos: {' + ', '.join(f'q{i}: {{profile: q{i + 1}}}' for i in range(COUNT)) + '}\nnodes: {}\n', 'cyclic-qos-profile'),
     ],

@@ -136,14 +136,6 @@ def test_merges_may_hold_merges():
     assert read(text)['c'] == {'three': 3, 'two': 2, 'one': 1}
 
 
-def test_a_quoted_merge_key_is_a_plain_key():
-    assert read('a: {"<<": {one: 1}}') == {'a': {'<<': {'one': 1}}}
-
-
-def test_an_anchor_may_be_given_anew():
-    assert read('a: &x 1\nb: *x\nc: &x 2\nd: *x\n') == {'a': 1, 'b': 1, 'c': 2, 'd': 2}
-
-
 @pytest.mark.parametrize(
     ('text', 'line'),
     [
@@ -162,8 +154,7 @@ def test_an_impossible_alias_is_a_finding(text, line):
     assert first_line(text) == f'file.yaml:{line}'
 
 
-@pytest.mark.parametrize('merged', [False, True])
-@pytest.mark.parametrize('innermost', ['{a: 1}', '{}'])
+@pytest.mark.parametrize(('innermost', 'merged'), [('{a: 1}', False), ('{}', True)])
 def test_aliases_in_aliases_do_not_explode(innermost, merged):
     lines = [f'x0: &x0 {innermost}']
     for level in range(1, 40):
@@ -198,17 +189,6 @@ def test_a_duplicate_key_shows_both_places():
         '  file.yaml:2:3: first used here\n'
         '  help: keep one; the first is on line 2'
     ]
-
-
-def test_each_further_key_of_a_name_is_reported():
-    assert [finding.span.line for finding in parse('a: 1\na: 2\nb: 3\na: 4\n').diagnostics] == [
-        2,
-        4,
-    ]
-
-
-def test_the_first_of_duplicate_keys_counts():
-    assert parse('a: 1\na: 2\n').data == {'a': 1}
 
 
 # Texts that are not as they should be
@@ -290,8 +270,9 @@ def test_an_open_quote_says_where_it_was_opened():
     assert first_line('a: 1\nb: "never\nc: "closed"\n') == expected
 
 
-@pytest.mark.parametrize('opening', ['[', '{a: ', '- ', '? ', '[{é: '])
-@pytest.mark.parametrize('levels', [300, 10_000])
+@pytest.mark.parametrize(
+    ('opening', 'levels'), [('[', 10_000), ('- ', 300), ('? ', 300), ('[{é: ', 10_000)]
+)
 def test_thousands_of_levels_are_the_finding_of_the_first_beyond_the_limit(opening, levels):
     """PyYAML 6.0.4 refuses 1,000 levels by itself, and names the last of them."""
     levels_each = opening.count('[{') + 1
@@ -299,14 +280,6 @@ def test_thousands_of_levels_are_the_finding_of_the_first_beyond_the_limit(openi
     assert first_line(opening * levels) == (
         f'file.yaml:1:{column}: error[too-deep]: the data is nested more than 100 levels deep'
     )
-
-
-def test_an_error_before_a_thousand_levels_is_the_finding():
-    assert 'error[yaml-syntax]' in first_line('a: ]\nb: ' + '[' * 10_000)
-
-
-def test_ten_thousand_levels_of_indentation_are_one_finding():
-    assert 'error[too-deep]' in first_line('\n'.join(' ' * level + 'a:' for level in range(2_000)))
 
 
 def test_a_hundred_levels_are_read():
@@ -333,10 +306,6 @@ def test_line_ends_marks_and_directives_do_not_matter(text):
 def test_lines_are_counted_whatever_ends_them(ending):
     positions = parse(ending.join(['version: 1', 'nodes:', '  rover: {}'])).positions
     assert place(positions.keys['nodes', 'rover']) == (3, 3, 'rover')
-
-
-def test_a_byte_order_mark_is_no_column():
-    assert place(parse('\ufeffversion: 1').positions.keys['version',]) == (1, 1, 'version')
 
 
 def test_yaml_is_read_by_the_core_schema():
@@ -445,7 +414,7 @@ snippets = st.sampled_from(
 
 
 @settings(
-    max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )
 @given(
     texts,
@@ -458,20 +427,7 @@ def test_a_damaged_file_never_raises(text, edits):
     check(text.encode(errors='ignore').decode())
 
 
-@pytest.mark.parametrize('name', ['a' * 300, 'a' * 1000, 'é' * 200])
-def test_endless_names_never_raise(name):
-    rules = {
-        finding.rule
-        for finding in check(
-            f'version: 1\ninterfaces: {{{name}: {name}, b: a/{name}}}\n'
-            f'nodes: {{{name}: {{on_start: "{name}:f", on_stop: "behaviours.{name}:f",'
-            f' publishers: {{{name}: {name}/msg/{name}}}}}}}\n'
-        )
-    }
-    assert 'unknown-behaviour' in rules
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_bytes_never_raise(content):
     document = parse(content)
@@ -480,15 +436,10 @@ def test_bytes_never_raise(content):
 
 ODD = [
     None,
-    True,
     0,
-    -1,
-    3,
-    1.5,
     float('nan'),
     10**250,
     '',
-    'a',
     'a:b',
     'std_msgs/msg/String',
     '~/x',
@@ -511,14 +462,12 @@ def replaced(data, path, value):
     return copy
 
 
-@pytest.mark.parametrize(
-    'value', [*ODD, [], {}, [None], {'a': None}, [[1]], {'type': {}}], ids=repr
-)
+@pytest.mark.parametrize('value', [*ODD, [], {'a': None}], ids=repr)
 def test_any_value_in_any_place_never_raises(value):
     everything = Path(__file__).parents[1] / 'data' / 'valid' / 'everything.yaml'
     data = parse_document(everything.read_bytes(), 'everything.yaml').data
     places = list(parts_of(data))
-    for path in random.Random(repr(value)).sample(places, 5):
+    for path in random.Random(repr(value)).sample(places, 2):
         text = json.dumps(replaced(data, path, value)).replace('NaN', '.nan')
         check(text)
 
