@@ -48,7 +48,7 @@ def run_all():
     return run_all
 
 
-@pytest.mark.parametrize('redirection', ['>&-', '2>&-', '<&-', '>&- 2>&- <&-', '2>/dev/full'])
+@pytest.mark.parametrize('redirection', ['>&- 2>&- <&-', '2>/dev/full'])
 def test_without_a_stream_the_exit_code_is_the_same(run_all, redirection):
     expected = dict(islice(COMMANDS.items(), 3))
     codes, _ = run_all(redirection, expected)
@@ -89,9 +89,7 @@ def end_without_reader(words, folder, **variables):
 @pytest.mark.parametrize(
     ('words', 'code'),
     [
-        ('explain', 0),
         ('check bad.yaml', 1),
-        ('graph good.yaml', 0),
         ('plan good.yaml other.yaml --exit-code', 2),
     ],
 )
@@ -108,6 +106,5 @@ def test_a_command_that_goes_on_ends_when_its_reader_has_gone(compose):
     child = compose(f'version: 1\nnodes: {{n: {{{system}}}}}\n', 'def tick(node): print(1)\n')
     child.wait_until_ready()
     domain = {'ROS_DOMAIN_ID': str(compose.domain_id)}
-    for words in (['top'], ['top', '--format', 'json']):
-        assert end_without_reader(words, compose.folder, **domain) == 0
+    assert end_without_reader(['top'], compose.folder, **domain) == 0
     assert child.stop() == 0

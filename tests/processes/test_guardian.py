@@ -165,22 +165,10 @@ def test_a_call_that_holds_the_interpreter_is_reported(compose, wait_for):
     wait_for(lambda: not is_there(guardian), 'its end')
 
 
-def test_a_process_that_has_ended_is_not_guarded(capfd, monkeypatch):
-    with subprocess.Popen(['true']) as process:
-        pass
-    monkeypatch.setattr('sys.argv', ['guardian', str(process.pid), '0', '1', '1', '0'])
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-
-    guardian.main()
-    assert capfd.readouterr().err == ''
-
-
-@pytest.mark.parametrize('signals', [['SIGTERM'], ['SIGINT', 'SIGINT']])
-def test_a_process_that_holds_the_interpreter_is_killed(compose, signals):
+def test_a_process_that_holds_the_interpreter_is_killed(compose):
     child = compose(HOLDING, CODE)
     child.wait_for_line('holding')
-    for name in signals:
-        child.send(signal.Signals[name])
+    child.send(signal.SIGTERM)
 
     assert child.wait() == -signal.SIGKILL
     assert child.matching('the system did not end in time')
@@ -251,16 +239,6 @@ def test_processes_of_behaviours_end_with_a_worker_that_cannot_start_again(compo
     child.wait_for_line(" outlived worker 'w': killed", times=STARTED + 1)
     pids = {int(line.split()[-2]) for line in child.matching(' stays')}
     wait_for(lambda: not any(map(is_there, pids)), 'their end')
-    assert child.stop() == 0
-
-
-def test_a_system_does_without_its_guardian(compose, wait_for):
-    child = compose('version: 1\nnodes: {n: {}}\n', '')
-    child.wait_until_ready()
-    guardian = guardian_of(child)
-    os.kill(guardian, signal.SIGKILL)
-    wait_for(lambda: not is_there(guardian), 'its end')
-
     assert child.stop() == 0
 
 

@@ -105,11 +105,8 @@ def test_a_parameter_that_is_set_governs_the_next_call(run):
     [
         ('echo scna', 1, ["no topic '/scna'", "did you mean '/scan'?"]),
         ('echo scan rangs', 1, ["no field 'rangs'", "did you mean 'ranges'?"]),
-        ('echo scan ranges.', 2, ["'ranges.' is no field"]),
-        ('call add {int64_vlue:~1}', 1, ["no field 'int64_vlue'", "'int64_value'?"]),
         ('call add {int64_value:', 2, ['is no YAML']),
         ('send-goal count -- -1', 1, ['the goal was aborted']),
-        ('set talker gian 1', 1, ["no parameter 'gian'", "did you mean 'gain'?"]),
         ('set talker gain 9', 1, ["'/talker' refuses gain = 9", 'out of range']),
     ],
 )
@@ -127,7 +124,6 @@ def test_what_is_wrong_is_told_with_a_way_out(run, words, code, told):
     ('words', 'line', 'code'),
     [
         (['echo', 'scan', '--hz'], ' Hz: ', 0),
-        (['echo', 'scan'], 'ranges: ', 0),
         (['send-goal', 'count', '100000'], 'sequence: ', 1),
     ],
 )
