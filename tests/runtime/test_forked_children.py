@@ -19,64 +19,70 @@ from pathlib import Path
 
 from rclpy.task import Future
 
-def tell(text):
-    with open('told', 'a') as file:
+def tell(name, text):
+    with open(name, 'a') as file:
         file.write(f'{text}\\n')
 
-def fork():
+def fork(name):
     child = os.fork()
     if child:
         _, status = os.waitpid(child, 0)
-        tell(f'the child ended with {os.waitstatus_to_exitcode(status)}')
+        tell(name, f'the child ended with {os.waitstatus_to_exitcode(status)}')
     return child == 0
 
 def fork_and_return(node):
-    print('from the child' if fork() else 'from the parent')
+    print('from the child' if fork('fork_and_return') else 'from the parent')
     return 'child' if os.getpid() != node.state.pid else 'parent'
 
 def fork_and_raise(node):
-    if fork():
+    if fork('fork_and_raise'):
         raise ValueError('in the child')
 
 def fork_and_exit(node):
-    if fork():
+    if fork('fork_and_exit'):
         raise SystemExit(7)
 
 def fork_and_exit_with_a_word(node):
-    if fork():
+    if fork('fork_and_exit_with_a_word'):
         raise SystemExit('the child goes')
 
 def fork_and_yield(node):
-    fork()
+    fork('fork_and_yield')
     yield None
-    fork()
+    fork('fork_and_yield')
     yield None
 
 async def fork_and_await(node):
-    fork()
+    fork('fork_and_await')
     future = Future()
     threading.Timer(0.1, future.set_result, [None]).start()
     await future
-    tell('after the wait')
+    tell('fork_and_await', 'after the wait')
     return None
 
-def run_process(node, method):
+def run(name, method):
     context = multiprocessing.get_context(method)
-    process = context.Process(target=tell, args=('in a process',))
+    process = context.Process(target=tell, args=(name, 'in a process'))
     process.start()
     process.join()
-    tell(f'the child ended with {process.exitcode}')
+    tell(name, f'the child ended with {process.exitcode}')
+
+def run_process(node):
+    run('run_process', 'fork')
+
+def spawn_process(node):
+    run('spawn_process', 'spawn')
 
 def terminate(node):
     process = multiprocessing.get_context('fork').Process(target=time.sleep, args=(1000,))
     process.start()
     process.terminate()
     process.join()
-    tell(f'the child ended with {process.exitcode}')
+    tell('terminate', f'the child ended with {process.exitcode}')
 
 def run_program(node):
     code = subprocess.call([sys.executable, '-c', 'raise SystemExit(3)'])
-    tell(f'the child ended with {code}')
+    tell('run_program', f'the child ended with {code}')
 
 def start(node):
     node.state.pid = os.getpid()
@@ -98,7 +104,8 @@ nodes:
   forker:
     on_start: parts:start
     publishers: {{words: std_msgs/msg/String}}
-    timers: {{fork: {{period: 0.1, behaviour: 'parts:{behaviour}', publish: words{arguments}}}}}
+    timers:
+{timers}
   ticker:
     state: {{ticks: 0}}
     publishers: {{ticks: std_msgs/msg/Int32}}
@@ -109,43 +116,48 @@ nodes:
 """
 
 
-@pytest.mark.parametrize(
-    ('behaviour', 'arguments', 'told'),
-    [
-        ('fork_and_return', '', ['the child ended with 0']),
-        ('fork_and_raise', '', ['the child ended with 1']),
-        ('fork_and_exit', '', ['the child ended with 7']),
-        ('fork_and_exit_with_a_word', '', ['the child ended with 1']),
-        ('fork_and_yield', '', ['the child ended with 0']),
-        ('fork_and_await', '', ['the child ended with 0', 'after the wait']),
-        ('run_process', ', with: {method: fork}', ['in a process', 'the child ended with 0']),
-        ('run_process', ', with: {method: spawn}', ['in a process', 'the child ended with 0']),
-        ('terminate', '', ['the child ended with -15']),
-        ('run_program', '', ['the child ended with 3']),
-    ],
-)
-def test_the_child_of_a_behaviour_ends_with_it_and_the_system_misses_nothing(
-    compose, wait_for, behaviour, arguments, told
-):
-    # A timer is a generator of one value in one case, which publishes nothing.
-    child = compose(SYSTEM.format(behaviour=behaviour, arguments=arguments), CODE)
-    path = compose.folder / 'told'
-    count = 2 * len(told)
-    wait_for(lambda: path.exists() and len(path.read_text().splitlines()) >= count, 'two rounds')
+# What each behaviour tells in a round.
+ENDS = 'the child ended with '
+TOLD = {
+    'fork_and_return': [f'{ENDS}0'],
+    'fork_and_raise': [f'{ENDS}1'],
+    'fork_and_exit': [f'{ENDS}7'],
+    'fork_and_exit_with_a_word': [f'{ENDS}1'],
+    'fork_and_yield': [f'{ENDS}0'],
+    'fork_and_await': [f'{ENDS}0', 'after the wait'],
+    'run_process': ['in a process', f'{ENDS}0'],
+    'spawn_process': ['in a process', f'{ENDS}0'],
+    'terminate': [f'{ENDS}-15'],
+    'run_program': [f'{ENDS}3'],
+}
+
+
+def test_the_children_of_behaviours_end_with_them_and_the_system_misses_nothing(compose, wait_for):
+    timers = '\n'.join(
+        f"      {name}: {{period: 0.1, behaviour: 'parts:{name}', publish: words}}"
+        for name in TOLD
+    )
+    child = compose(SYSTEM.format(timers=timers), CODE)
+
+    def told(name):
+        path = compose.folder / name
+        return path.read_text().splitlines() if path.exists() else []
+
+    def have_all_told():
+        return all(len(told(name)) >= 2 * len(lines) for name, lines in TOLD.items())
+
+    wait_for(have_all_told, 'two rounds')
     child.wait_for_line(' in order', times=len(child.matching(' in order')) + 2)
     assert child.stop() == 0
 
-    lines = path.read_text().splitlines()
-    assert lines[:count] == told * 2
+    for name, lines in TOLD.items():
+        assert told(name)[: 2 * len(lines)] == lines * 2, name
     assert not child.matching('AssertionError')
     assert len(child.matching(' in order')) == len(set(child.matching(' in order')))
-    if behaviour == 'fork_and_return':
-        assert child.matching('from the child')
-    if behaviour == 'fork_and_raise':
-        assert child.matching('ValueError: in the child')
-        assert not child.matching('raised ValueError')
-    if behaviour == 'fork_and_exit_with_a_word':
-        assert child.matching('the child goes')
+    assert child.matching('from the child')
+    assert child.matching('ValueError: in the child')
+    assert not child.matching('raised ValueError')
+    assert child.matching('the child goes')
 
 
 def test_what_is_in_the_buffers_is_written_once(compose):
@@ -159,7 +171,7 @@ def test_what_is_in_the_buffers_is_written_once(compose):
 def fork_once(node):
     sys.stdout = open(sys.stdout.fileno(), 'w', buffering=10000, closefd=False)
     print('before the fork')
-    if not fork():
+    if not fork('fork_once'):
         print('after the fork')
         node.shutdown()
 """

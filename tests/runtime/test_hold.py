@@ -12,6 +12,7 @@ SYSTEM = """
       here: {on_start: parts:begin}
       there: {worker: apart, on_start: parts:begin}
     """
+ALONE = SYSTEM.replace('worker: apart, ', '')
 CODE = """
     def begin(node):
         node.logger.info('begins')
@@ -38,7 +39,7 @@ def test_behaviours_start_when_the_file_is_gone(compose, hold, wait_for):
 
 def test_without_the_file_nothing_is_held(compose, hold):
     hold.unlink()
-    child = compose(SYSTEM, CODE, '--hold', hold)
+    child = compose(ALONE, CODE, '--hold', hold)
     child.wait_until_ready()
     assert child.stop() == 0
     assert not hold.exists()
@@ -56,7 +57,7 @@ def test_a_system_that_nobody_lets_go_ends(compose, hold, monkeypatch, tmp_path)
         'import composer.runtime.system as hold\nhold._LONGEST_HOLD_SEC = 0.3\n'
     )
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    child = compose(SYSTEM, CODE, '--hold', hold)
+    child = compose(ALONE, CODE, '--hold', hold)
     assert child.wait() == 1
     assert child.matching(f'nobody has removed {hold} within 0.3 s')
     assert not hold.exists()

@@ -24,11 +24,6 @@ def close(node, kind):
     for descriptor in list(descriptors(kind)):
         os.close(descriptor)
 
-def replace(node, kind):
-    null = os.open(os.devnull, os.O_RDWR)
-    for descriptor in list(descriptors(kind)):
-        os.dup2(null, descriptor)
-
 def close_all(node):
     os.closerange(3, 4096)
 
@@ -64,9 +59,6 @@ nodes:
     'behaviour',
     [
         "'parts:close', with: {kind: timerfd}",
-        "'parts:replace', with: {kind: timerfd}",
-        "'parts:close', with: {kind: eventpoll}",
-        "'parts:close', with: {kind: eventfd}",
         "'parts:close', with: {kind: pipe}",
         "'parts:close_all'",
         "'parts:replace_builtin'",

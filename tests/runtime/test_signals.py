@@ -64,7 +64,7 @@ def start(node):
 """
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP])
 def test_before_the_system_runs_a_signal_ends_all_at_once(compose, number):
     """Whatever is being imported, and whatever that catches."""
     before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -88,8 +88,10 @@ def test_while_the_system_starts_only_ctrl_c_is_no_success(compose, number):
     assert child.lines == ['busy']
 
 
-@pytest.mark.parametrize('moment', ['busy at exit', 'busy very late'])
-@pytest.mark.parametrize(('number', 'code'), [(signal.SIGINT, 0), (signal.SIGTERM, 4)])
+@pytest.mark.parametrize(
+    ('moment', 'number', 'code'),
+    [('busy at exit', signal.SIGINT, 0), ('busy very late', signal.SIGTERM, 4)],
+)
 def test_while_the_process_exits_the_code_is_that_of_the_stop(compose, moment, number, code):
     child = compose(SYSTEM, AT_EXIT.replace('CODE', str(code)))
     child.wait_for_line(moment)

@@ -112,11 +112,11 @@ def run_program(compose):
 
 def test_many_systems_in_a_row_leave_nothing_behind(compose, run_program):
     path = compose.write(SYSTEM, CODE)
-    result = json.loads(run_program(PROGRAM, path.name, 20))
+    result = json.loads(run_program(PROGRAM, path.name, 8))
 
     assert result['seen'] > 0, 'a middleware that shares no memory'
     assert result == {
-        'codes': [0] * 20,
+        'codes': [0] * 8,
         'threads': ['MainThread'],
         'new tasks and descriptors': [0, 0],
         'seen': result['seen'],
@@ -136,7 +136,7 @@ import json, os, sys, threading
 import composer
 
 errors = []
-for _ in range(5):
+for _ in range(3):
     try:
         composer.up(sys.argv[1])
     except Exception as error:
@@ -151,7 +151,7 @@ print(json.dumps([
     errors, threads, left = json.loads(run_program(program, path.name))
 
     message = "node 'listener': on_start raised OSError('no such device')"
-    assert errors == [f'StartError: {message}'] * 5
+    assert errors == [f'StartError: {message}'] * 3
     assert threads == ['MainThread']
     assert left == []
 

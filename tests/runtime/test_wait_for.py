@@ -245,8 +245,6 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
 @pytest.mark.parametrize(
     ('condition', 'trouble', 'help_line'),
     [
-        ('topic: scan', "topic '/scan': nothing publishes it", 'published topics: /words'),
-        ('service: reset', "service '/reset': nothing serves it", 'services: /ask'),
         ('action: grasp', "action '/grasp': nothing serves it", 'actions: /count'),
         (
             'node: /robot/ghost',
@@ -272,7 +270,6 @@ def test_each_kind_says_what_there_is_instead(compose, peer, condition, trouble,
           free:
             on_start: parts:meet_peer
             publishers: {{words: {{type: std_msgs/msg/String, external: true}}}}
-            services: {{ask: {{type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}}}
             actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}
     """
     child = compose(text, CODE)

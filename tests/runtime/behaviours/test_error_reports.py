@@ -215,20 +215,6 @@ def test_a_restart_that_fails_is_tried_again(compose):
     assert child.stop() == 0
 
 
-def test_a_restart_of_many_nodes_at_once_brings_all_of_them_back(compose):
-    nodes = '\n'.join(
-        f'  n{n}: {{on_error: restart, state: {{ticks: 0}}, publishers: {{p: std_msgs/msg/Int32}}, '
-        f"timers: {{tick: {{period: 0.01, behaviour: 'parts:tick'}}}}, parameters: {{mode: a}}}}"
-        for n in range(6)
-    )
-    child = compose(f'version: 1\nnodes:\n{nodes}\n', RESTARTING_CODE)
-    for n in range(6):
-        child.wait_for_line(f"node 'n{n}' was restarted", times=2)
-
-    assert child.stop() == 0
-    assert not child.matching('InvalidHandle')
-
-
 def test_a_message_cannot_write_lines_or_escape_codes_into_the_log(compose, peer):
     text = """
         version: 1
@@ -257,7 +243,7 @@ def test_errors_of_callbacks_that_are_no_behaviours_are_counted(compose, peer):
     wrong = Parameter(name='p', value=ParameterValue(type=99))
     client = peer.run(peer.node.create_client, SetParameters, '/n/set_parameters')
     assert client.wait_for_service(DEADLINE_SEC)
-    for _ in range(100):
+    for _ in range(20):
         client.call_async(SetParameters.Request(parameters=[wrong]))
         # The queue of a service holds ten requests: wait until this one has been taken.
         peer.call(SetParameters, '/n/set_parameters')
@@ -265,4 +251,4 @@ def test_errors_of_callbacks_that_are_no_behaviours_are_counted(compose, peer):
     assert child.stop() == 0
     assert len(child.matching('Traceback')) == 1
     counts = [line.split(' raised ')[1] for line in child.matching('more')]
-    assert sum(int(count.split()[0].replace('once', '1')) for count in counts) == 99
+    assert sum(int(count.split()[0].replace('once', '1')) for count in counts) == 19

@@ -423,7 +423,7 @@ def test_of_many_goals_each_ends_in_one_right_state_also_at_the_stop(compose, pe
 
 
 def check_many_goals_at_once(client, rule, behaviour):
-    count = 50
+    count = 20
     handles = client.send_all(count)
     accepted = [n for n, handle in enumerate(handles) if handle.accepted]
     results = client.peer.run(lambda: {n: handles[n].get_result_async() for n in accepted})

@@ -207,7 +207,7 @@ STRICTER = ('as a part of it', 'names below it')
 
 def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
     agreed = refused = 0
-    for seed in range(400):
+    for seed in range(150):
         writer = Writer(seed)
         paths = [tmp_path / f'{name}.yaml' for name in 'pq'[: 1 + seed % 2]]
         for path in paths:
@@ -229,8 +229,8 @@ def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
         assert found == expected, f'seed {seed}'
         agreed += expected is not None
         refused += expected is None
-    assert agreed > 50
-    assert refused > 50
+    assert agreed > 20
+    assert refused > 20
 
 
 def test_rcl_declares_the_values_that_we_read(context, tmp_path):

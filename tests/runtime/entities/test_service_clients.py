@@ -312,11 +312,11 @@ def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
     assert child.stop() == 0
 
 
-def test_of_thousands_of_calls_at_once_no_answer_is_lost_or_swapped(compose):
+def test_of_hundreds_of_calls_at_once_no_answer_is_lost_or_swapped(compose):
     behaviours = ('ask_often', 'ask_often_async')
     timers = '\n'.join(
         f"              t{number}: {{period: 0.02, behaviour: 'parts:{behaviours[number % 2]}', group: g{number},"
-        f' with: {{first: {number * 1000000}, count: 250}}}}'
+        f' with: {{first: {number * 1000000}, count: 80}}}}'
         for number in range(8)
     )
     text = f"""
@@ -329,12 +329,11 @@ def test_of_thousands_of_calls_at_once_no_answer_is_lost_or_swapped(compose):
           server: {{services: {{echo: {{type: test_msgs/srv/BasicTypes, behaviour: 'parts:echo'}}}}}}
     """
     child = compose(text, CODE)
-    child.wait_for_line('right: 250', times=8)
+    child.wait_for_line('right: 80', times=8)
 
     assert child.stop() == 0
 
 
-ON_START = 'on_start: parts:wait_long'
 ASYNC_ON_START = 'on_start: parts:wait_long_async'
 TIMERS = """timers:
               one: {period: 0.02, behaviour: 'parts:wait_long', group: one}
@@ -344,10 +343,8 @@ TIMERS = """timers:
 @pytest.mark.parametrize(
     ('client', 'server'),
     [
-        (ON_START, 'nobody'),
         (ASYNC_ON_START, 'hang'),
         (TIMERS, 'nobody'),
-        (TIMERS, 'hang'),
         ('on_start: parts:insist', 'nobody'),
     ],
 )

@@ -3,7 +3,6 @@
 import shutil
 import struct
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ pytest.importorskip('rclpy')
 
 from rosgraph_msgs.msg import Clock
 
+from composer.cli.main import run
 from composer.runtime.health import watched_clocks
 from composer.runtime.health.missed import MissedCounts, MissedTicks
 
@@ -83,7 +83,7 @@ def test_a_step_is_no_missed_tick(monkeypatch):
         assert ticks() == MissedCounts(late_ticks=1, skipped_ticks=3599)
 
 
-def test_nodes_that_wait_for_a_missing_clock_are_told_of_once(compose, peer, wait_for):
+def test_nodes_that_wait_for_a_missing_clock_are_told_of_once(compose, peer, wait_for, capsys):
     system = """\
 version: 1
 defaults: {use_sim_time: true}
@@ -98,8 +98,8 @@ nodes:
     )
 
     def health():
-        command = [sys.executable, '-m', 'composer', 'ps']
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert run(['ps']) == 0
+        return capsys.readouterr().out
 
     assert "health: nobody publishes '/clock'" in health()
     publisher = peer.run(peer.node.create_publisher, Clock, '/clock', 1)

@@ -1,8 +1,6 @@
 """Edits of a node with a lifecycle: applied in whatever state it is, which it keeps."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
@@ -11,7 +9,8 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
 
-from tests.running import ROOT, wait_for
+from composer.cli.main import run
+from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -48,15 +47,14 @@ def edit(compose, child, *replaced):
     child.wait_for_line('reloaded in', times=reloads + 1)
 
 
-def ask(*arguments):
-    done = subprocess.run(
-        [sys.executable, '-m', 'composer', *arguments, '--format', 'json'],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return json.loads(done.stdout)
+@pytest.fixture
+def ask(capsys):
+    def ask(*arguments):
+        capsys.readouterr()
+        assert run([*arguments, '--format', 'json']) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return ask
 
 
 def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
@@ -120,7 +118,7 @@ def test_an_edit_that_cannot_come_back_to_its_state_is_undone(compose, peer):
     assert child.stop() == 0
 
 
-def test_the_state_is_shown(compose, peer):
+def test_the_state_is_shown(compose, peer, ask):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
     (system,) = ask('ps')['systems']

@@ -497,7 +497,7 @@ def test_modules_are_new_with_all_that_import_them(edited, replacements, changes
     assert edited.read() == before | changes | {'count': 1}
 
 
-@pytest.mark.parametrize('name', ['late', 'star', 'circle', 'inner', 'deep'])
+@pytest.mark.parametrize('name', ['late', 'circle', 'inner'])
 def test_a_module_that_raises_changes_nothing(edited, name):
     before = edited.read()
     _, said = edited.edit({f"'old {name}'": f"'new {name}' if 1 / 0 else ''"})
@@ -578,12 +578,12 @@ def test_reloads_leave_nothing_behind(compose, peer):
     write(0)
     child = compose.run('system.yaml')
     child.wait_until_ready()
-    reload(3)
+    reload(2)
     counts = [count()]
     for _ in range(2):
-        reload(15)
+        reload(6)
         counts.append(count())
-    # One object that each of the 30 reloads leaves would be as many. What is made once and kept,
+    # One object that each of the 12 reloads leaves would be as many. What is made once and kept,
     # as for a log line or a peer that is found late, is there after one of both rounds only.
-    assert min(after - before for before, after in pairwise(counts)) < 30, (counts, child.output)
+    assert min(after - before for before, after in pairwise(counts)) < 12, (counts, child.output)
     assert child.stop() == 0

@@ -91,9 +91,9 @@ def test_who_calls_a_server_moves_with_it(compose):
         nodes = {'server': node(server, serves), 'client': node(client, *calls)}
         return system(nodes, f'executor: {{shutdown_timeout: 8}}\n{more}')
 
-    child = compose(text('', ''), code, '--watch')
+    child = compose(text('left', 'right'), code, '--watch')
     environment = 'workers: {both: {environment: {SENSOR: front}}}\n'
-    edits = [('left', 'right'), ('both', 'both'), ('both', 'both', environment)]
+    edits = [('both', 'both'), ('both', 'both', environment)]
     for times, each in enumerate([None, *edits], start=1):
         if each is not None:
             edit(compose, child, text(*each), code)

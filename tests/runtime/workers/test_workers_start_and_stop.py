@@ -1,7 +1,6 @@
 """Nodes in workers start and stop with their system, as nodes of its own process do."""
 
 import os
-import signal
 
 import pytest
 
@@ -25,17 +24,22 @@ from tests.runtime.workers.observed import (
 pytestmark = pytest.mark.ros
 
 
-def test_each_worker_is_a_process_and_what_crosses_arrives(compose):
+def test_each_worker_is_a_process_with_its_settings_and_what_crosses_arrives(compose):
+    tell = """
+    def tell(node):
+        print('has', os.environ['SENSOR'], os.sched_getaffinity(0), os.nice(0), flush=True)
+    """
     child = compose(
         system(
             {
                 'talker': node('left', *TALKS),
-                'near': node('left', *HEARS),
+                'near': node('left', 'timers: {t: {period: 0.2, behaviour: parts:tell}}', *HEARS),
                 'far': node('right', *HEARS),
                 'home': node('', *HEARS),
-            }
+            },
+            'workers: {left: {environment: {SENSOR: front}, cpus: [1], nice: 3, threads: 2}}\n',
         ),
-        CODE,
+        CODE + tell,
     )
     child.wait_until_ready()
     pids = {name: pid_of(child, name) for name in ('talker', 'near', 'far', 'home')}
@@ -45,6 +49,7 @@ def test_each_worker_is_a_process_and_what_crosses_arrives(compose):
     for name in ('near', 'far', 'home'):
         line = child.wait_for_line(f'{name} hears')
         assert line.endswith(f'of {pids["talker"]} in {pids[name]}')
+    assert child.wait_for_line('has') == f'has front {{1}} {os.nice(0) + 3}'
     assert child.stop() == 0
     ends = [line for line in child.lines if ' ends in ' in line]
     assert sorted(ends) == sorted(f'{name} ends in {pid}' for name, pid in pids.items())
@@ -132,31 +137,19 @@ def test_what_waits_is_started_across_workers(compose):
     )
     waiting = node('right', 'wait_for: {service: add}', *HEARS)
     last = node('', 'wait_for: {node: second}', *TALKS)
+    patient = node('right', 'wait_for: {process: setup}')
     child = compose(
         system(
-            {'third': last, 'second': waiting, 'first': serves},
-            'processes: {program: {command: [sleep, 60]}}\n',
+            {'third': last, 'second': waiting, 'first': serves, 'patient': patient},
+            'processes: {setup: {command: [sh, -c, "sleep 0.5"]}}\n',
         ),
         CODE,
     )
     child.wait_until_ready()
     begun = [line.split()[0] for line in child.lines if ' begins in ' in line]
-    assert begun == ['first', 'second', 'third']
+    assert [each for each in begun if each != 'patient'] == ['first', 'second', 'third']
+    assert begun.index('first') < begun.index('patient')
     child.wait_for_line('second hears')
-    assert child.stop() == 0
-
-
-def test_a_worker_waits_for_external_processes(compose):
-    child = compose(
-        system(
-            {'eager': node('left'), 'patient': node('right', 'wait_for: {process: setup}')},
-            'processes: {setup: {command: [sh, -c, "sleep 0.5; echo has set up"]}}\n',
-        ),
-        CODE,
-    )
-    child.wait_until_ready()
-    order = [line.split()[0] for line in child.lines if 'begins' in line or 'has set up' in line]
-    assert order[0] == 'eager'
     assert child.stop() == 0
 
 
@@ -166,25 +159,6 @@ def test_a_node_of_a_worker_ends_the_system_with_its_exit_code(compose):
     assert child.wait() == 3
     assert child.matching('home ends in')
     assert child.matching('last ends in')
-
-
-def test_a_worker_has_its_environment_its_cores_and_its_niceness(compose):
-    code = """
-        import os
-
-        def tell(node):
-            print('has', os.environ['SENSOR'], os.sched_getaffinity(0), os.nice(0), flush=True)
-    """
-    timer = 'timers: {t: {period: 0.2, behaviour: parts:tell}}'
-    child = compose(
-        system(
-            {'one': '{worker: left, ' + timer + '}'},
-            'workers: {left: {environment: {SENSOR: front}, cpus: [1], nice: 3, threads: 1}}\n',
-        ),
-        code,
-    )
-    assert child.wait_for_line('has') == f'has front {{1}} {os.nice(0) + 3}'
-    assert child.stop(signal.SIGTERM) == 0
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,12 @@
 
 import os
 import signal
-import time
 
 import pytest
 
 pytest.importorskip('rclpy')
 
-from tests.running import descendants, is_there, wait_for
+from tests.running import descendants, is_there
 from tests.runtime.workers.observed import (
     CODE,
     HEARS,
@@ -31,68 +30,71 @@ STOPS = [signal.SIGTERM, signal.SIGINT]
 SIGNALS = [signal.SIGKILL, signal.SIGTERM]
 
 
-@pytest.mark.parametrize('number', SIGNALS, ids=lambda each: each.name)
-def test_a_worker_that_dies_is_started_again_and_the_others_run_on(compose, number):
+def test_a_worker_that_dies_is_started_again_and_the_others_run_on(compose):
     child = compose(system(NODES, 'workers: {left: {restart: {delay: 0.1}}}\n'), CODE)
     child.wait_until_ready()
-    before = {name: pid_of(child, name) for name in NODES}
+    far, home = pid_of(child, 'far'), pid_of(child, 'home')
     child.wait_for_line('far hears')
-    os.kill(before['talker'], number)
-    assert pid_of(child, 'talker', times=2) != before['talker']
-    child.wait_for_line("worker 'left' was started again, with its nodes")
-    again = pid_of(child, 'talker', times=2)
-    child.wait_for_line(f' of {again} in {before["far"]}')
+    for times, number in enumerate(SIGNALS, start=1):
+        before = pid_of(child, 'talker', times=times)
+        os.kill(before, number)
+        again = pid_of(child, 'talker', times=times + 1)
+        assert again != before
+        child.wait_for_line("worker 'left' was started again, with its nodes", times=times)
+        child.wait_for_line(f' of {again} in {far}')
+        child.wait_for_line(f' of {again} in {home}')
+        assert len(child.matching(f'talker ends in {before}')) == (number in STOPS)
+        assert len(child.matching("left' has ended; its node is gone: '/talker'")) == times
+        assert len(child.matching("'/far' gets nothing on '/numbers'")) == times
+        assert len(child.matching("'/home' gets nothing on '/numbers'")) == times
     assert len(child.matching('far begins')) == len(child.matching('home begins')) == 1
-    assert child.matching("worker 'left' has ended; its node is gone: '/talker'")
-    assert child.matching("'/far' gets nothing on '/numbers'")
-    assert child.matching("'/home' gets nothing on '/numbers'")
-    assert len(child.matching(f'talker ends in {before["talker"]}')) == (number in STOPS)
     assert child.stop() == 0
     assert 'Traceback' not in child.output
 
 
-NEVER = 'restart: {when: never}'
-REQUIRED = f'{NEVER}, required: true'
-ENDS = "worker 'left' is required: the system ends"
-
-
-@pytest.mark.parametrize(
-    ('rules', 'how', 'line', 'code'),
-    [
-        (NEVER, 'SIGKILL', "worker 'left' was ended by SIGKILL", None),
-        (REQUIRED, 'SIGKILL', ENDS, 1),
-        ('restart: {when: on_failure}', 0, "worker 'left' has ended with exit code 0", None),
-        (REQUIRED, 0, ENDS, 0),
-    ],
-)
-def test_a_worker_that_is_not_started_again(compose, rules, how, line, code):
-    leave = """
+LEAVE = """
     def leave(node):
         if os.path.exists('leave'):
             os._exit(0)
     """
-    leaver = '{worker: left, timers: {t: {period: 0.05, behaviour: parts:leave}}}'
-    nodes = {**NODES, 'leaver': leaver}
-    child = compose(system(nodes, f'workers: {{left: {{{rules}}}}}\n'), CODE + leave)
+LEAVER = '{worker: third, timers: {t: {period: 0.05, behaviour: parts:leave}}}'
+REQUIRED = 'restart: {when: never}, required: true'
+
+
+def test_a_worker_that_is_not_started_again(compose):
+    rules = (
+        'workers: {left: {restart: {when: never}}, third: {restart: {when: on_failure}}, '
+        f'right: {{{REQUIRED}}}}}\n'
+    )
+    child = compose(system({**NODES, 'leaver': LEAVER}, rules), CODE + LEAVE)
     child.wait_until_ready()
-    if how == 0:
-        (compose.folder / 'leave').touch()
-    else:
-        os.kill(pid_of(child, 'talker'), signal.Signals[how])
-    child.wait_for_line(line)
-    if code is None:
-        assert is_there(pid_of(child, 'far'))
-        assert child.stop() == 0
-    else:
-        assert child.wait() == code
-    assert child.matching('far ends in')
+    os.kill(pid_of(child, 'talker'), signal.SIGKILL)
+    child.wait_for_line("worker 'left' was ended by SIGKILL")
+    (compose.folder / 'leave').touch()
+    child.wait_for_line("worker 'third' has ended with exit code 0")
+    far = pid_of(child, 'far')
+    assert is_there(far)
+    os.kill(far, signal.SIGKILL)
+    child.wait_for_line("worker 'right' is required: the system ends")
+    assert child.wait() == 1
+    assert child.matching('home ends in')
+    assert not child.matching('was started again')
+
+
+def test_a_required_worker_that_ends_well_ends_the_system_well(compose):
+    nodes = {'home': node('', *HEARS), 'leaver': LEAVER}
+    child = compose(system(nodes, f'workers: {{third: {{{REQUIRED}}}}}\n'), CODE + LEAVE)
+    child.wait_until_ready()
+    (compose.folder / 'leave').touch()
+    child.wait_for_line("worker 'third' is required: the system ends")
+    assert child.wait() == 0
     assert child.matching('home ends in')
 
 
 def test_whichever_process_is_killed_nothing_is_left(compose):
     killed, everyone = 0, [0]
     while killed < len(everyone):
-        child = compose(system(NODES), CODE)
+        child = compose(system({'talker': node('left', *TALKS), 'home': node('', *HEARS)}), CODE)
         child.wait_until_ready()
         everyone = [child.pid, *sorted(descendants(child.pid))]
         os.kill(everyone[killed], signal.SIGKILL)
@@ -114,7 +116,7 @@ def test_all_processes_but_one_are_killed_and_nothing_is_left(compose):
         wait_until_gone(everyone)
 
 
-def test_a_worker_that_hangs_in_c_does_not_keep_the_system_from_its_end(compose):
+def test_workers_that_hang_in_c_or_are_stopped_do_not_keep_the_system_from_its_end(compose):
     code = """
     import ctypes
 
@@ -125,27 +127,24 @@ def test_a_worker_that_hangs_in_c_does_not_keep_the_system_from_its_end(compose)
     timer = 'timers: {t: {period: 0.1, behaviour: parts:hang}}'
     child = compose(
         system(
-            {'bad': '{worker: left, ' + timer + '}', 'home': node('')},
+            {
+                'bad': '{worker: left, ' + timer + '}',
+                'far': node('right'),
+                'home': node(''),
+            },
             'executor: {shutdown_timeout: 1}\n',
         ),
         CODE + code,
     )
+    child.wait_until_ready()
     child.wait_for_line('bad hangs')
     everyone = descendants(child.pid)
+    os.kill(pid_of(child, 'far'), signal.SIGSTOP)
     assert child.stop() == 1
     assert child.matching('home ends in')
     assert child.matching("worker 'left' has not stopped in time")
-    wait_until_gone(everyone)
-
-
-def test_a_worker_that_was_stopped_is_killed_at_the_stop_of_the_system(compose):
-    child = compose(system(NODES, 'executor: {shutdown_timeout: 1}\n'), CODE)
-    child.wait_until_ready()
-    everyone = descendants(child.pid)
-    os.kill(pid_of(child, 'talker'), signal.SIGSTOP)
-    assert child.stop() == 1
-    assert child.matching("worker 'left' has not stopped in time")
-    assert not child.matching('talker ends in')
+    assert child.matching("worker 'right' has not stopped in time")
+    assert not child.matching('far ends in')
     wait_until_gone(everyone)
 
 
@@ -183,31 +182,11 @@ def begin(node):
     assert not child.matching('could not start again')
 
 
-def test_workers_die_at_random_and_the_system_stays_whole(compose):
-    child = compose(
-        system(NODES, 'workers: {left: {restart: {delay: 0}}, right: {restart: {delay: 0}}}\n'),
-        CODE,
-    )
-    child.wait_until_ready()
-    for times in (2, 3):
-        for name in ('talker', 'far'):
-            os.kill(pid_of(child, name, times=times - 1), signal.SIGKILL)
-            time.sleep(0.05)
-        for name in ('talker', 'far'):
-            pid_of(child, name, times=times)
-    last = pid_of(child, 'talker', times=3)
-    wait_for(lambda: child.matching(f'of {last} in {pid_of(child, "far", times=3)}'), 'messages')
-    assert child.stop() == 0
-
-
-@pytest.mark.parametrize(('where', 'code'), [('import', 1), ('on_start', 1)])
-def test_a_worker_without_its_descriptors_ends(compose, where, code):
-    spoil = 'os.closerange(3, 200)'
+def test_a_worker_without_its_descriptors_ends(compose):
     text = system({'home': node(''), 'bad': '{worker: left, on_start: spoils:begin}'})
-    lines = {'import': f'import os\n{spoil}\ndef begin(node): pass\n'}
-    lines['on_start'] = f'import os\ndef begin(node): {spoil}\n'
-    (compose.folder / 'spoils.py').write_text(lines[where])
+    spoil = 'import os\ndef begin(node): os.closerange(3, 200)\n'
+    (compose.folder / 'spoils.py').write_text(spoil)
     child = compose(text, CODE)
-    assert child.wait() == code
+    assert child.wait() == 1
     assert child.matching("worker 'left' has ended with exit code 1 while it started")
     assert not child.matching(' ready in ')
