@@ -44,7 +44,6 @@ os._exit(0)
 """
 _WHAT = {
     'epoll': 'poller._epoll.fileno()',
-    'timer': 'poller.deadlines.timer.fd',
     'wake_up': 'poller._wake_fd',
     'subscription': 'max(poller.event_fds.by_number)',
     'standby': 'executor._spinner.workers._timer.fd',
@@ -60,7 +59,6 @@ _HOW = {
     ('what', 'how'),
     [
         ('epoll', 'closed'),
-        ('timer', 'closed'),
         ('wake_up', 'replaced_by_its_kind'),
         ('subscription', 'replaced'),
         ('standby', 'closed'),

@@ -52,26 +52,12 @@ def await_for_ever(executor: Any, node: Any) -> None:
     executor.spin_once(0)
 
 
-def shut_the_context_down(executor: Any, node: Any) -> None:
-    executor.add_node(node)
-    executor.spin_once(0.01)
-    executor.context.shutdown()
-
-
 WAYS: dict[str, Callable[[Any, Any], Any]] = {
-    'never spun': lambda executor, node: None,
-    'with a node': lambda executor, node: executor.add_node(node),
-    'spun': lambda executor, node: executor.spin_once(0),
     'spun with a node': lambda executor, node: rclpy.spin_once(node, executor=executor),
     'spun in a thread': spin_in_a_thread,
-    'a future': lambda executor, node: executor.spin_until_future_complete(
-        executor.create_task(lambda: None)
-    ),
-    'a later call': lambda executor, node: executor.call_later(1000, print),
     'a callback is left': leave_a_callback,
     'an error': raise_in_a_callback,
     'a coroutine waits': await_for_ever,
-    'the context is shut down': shut_the_context_down,
     'not all have ended': lambda executor, node: executor.shutdown(0, wait_for_threads=False),
 }
 
@@ -98,12 +84,9 @@ def no_collection() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures('no_collection')
-@pytest.mark.parametrize('how', WAYS)
-def test_a_dropped_executor_leaves_nothing_without_the_garbage_collector(
-    how: str, domain_id: int
-) -> None:
+def test_a_dropped_executor_leaves_nothing_without_the_garbage_collector(domain_id: int) -> None:
     before = held()
-    for _ in range(3):
+    for use in WAYS.values():
         context = Context()
         rclpy.init(context=context, domain_id=domain_id)
         node = rclpy.create_node('node', context=context)
@@ -111,13 +94,13 @@ def test_a_dropped_executor_leaves_nothing_without_the_garbage_collector(
         node.create_timer(0.001, int)
         node.create_guard_condition(int)
         executor = ComposerExecutor(context=context)
-        WAYS[how](executor, node)
+        use(executor, node)
         gone = weakref.ref(executor)
         del executor
         wait_for(lambda gone=gone: gone() is None)
         node.destroy_node()
         context.try_shutdown()
-    wait_for(lambda: held() == before)
+        wait_for(lambda: held() == before)
 
 
 def test_one_that_its_callbacks_refer_to_is_freed_by_the_garbage_collector(
@@ -143,14 +126,14 @@ def test_many_that_refer_to_themselves_do_not_use_up_the_descriptors(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # What other tests of this process held may have raised it.
-    monkeypatch.setattr(composer_executor, '_most_executors', 32)
+    monkeypatch.setattr(composer_executor, '_most_executors', 8)
     before = len(held())
-    for _ in range(200):
+    for _ in range(60):
         executor: Any = ComposerExecutor(context=context)
         executor.itself = executor
         executor.spin_once(0)
-        # Three each, of a hundred; without the collection it would come to 600.
-        assert len(held()) - before < 400
+        # Three each; without the collection it would come to 180.
+        assert len(held()) - before < 120
 
 
 def test_a_node_goes_on_in_another_executor_after_its_own_was_dropped(context: Context) -> None:
@@ -172,7 +155,7 @@ def test_a_node_goes_on_in_another_executor_after_its_own_was_dropped(context: C
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.parametrize('threads', [None, 1, 2])
+@pytest.mark.parametrize('threads', [None, 1])
 def test_any_number_of_threads_goes_without_a_warning(
     context: Context, threads: int | None
 ) -> None:

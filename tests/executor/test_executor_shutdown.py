@@ -5,7 +5,6 @@ import signal
 import sys
 import threading
 import time
-import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
@@ -55,13 +54,6 @@ def test_shutdown_waits_for_a_callback_and_reports_a_stuck_one(
     assert not thread.is_alive()
     let_go.set()
     assert executor.shutdown(wait_for_threads=wait_for_threads)
-
-
-def test_shutdown_from_a_callback(node: Any, executor: Any) -> None:
-    results: list[bool] = []
-    node.create_timer(0.01, lambda: results.append(executor.shutdown()))
-    executor.spin()
-    assert results == [True]
 
 
 def test_callbacks_that_all_shut_down_wait_for_none_of_them(node: Any, executor: Any) -> None:
@@ -352,22 +344,6 @@ def test_a_group_shared_by_two_executors_is_exclusive(executor: Any, context: Co
     with spinning(executor), spinning(second):
         wait_for(lambda: total > 50)
     assert most == 1
-
-
-def test_the_executor_can_be_garbage_collected(context: Context) -> None:
-    executor = ComposerExecutor(context=context)
-    node = rclpy.create_node('node', context=context)
-    executor.add_node(node)
-    executor.spin_once(timeout_sec=0.01)
-    executor.shutdown()
-    gone = weakref.ref(executor)
-    del executor
-
-    def is_gone() -> bool:
-        gc.collect()
-        return gone() is None
-
-    wait_for(is_gone)
 
 
 @pytest.mark.parametrize('how', ['spin', 'spin_once', 'spin_until_future_complete'])

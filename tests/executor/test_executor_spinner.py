@@ -33,11 +33,6 @@ def test_spin_once_runs_one_callback(node: Any, executor: Any) -> None:
     assert ticks == [1]
 
 
-def test_spin_once_with_zero_timeout_does_not_wait(node: Any, executor: Any) -> None:
-    node.create_timer(100.0, lambda: None)
-    executor.spin_once(timeout_sec=0)
-
-
 def test_spin_once_returns_at_its_timeout(node: Any, executor: Any) -> None:
     begin = time.monotonic()
     executor.spin_once(timeout_sec=0.1)
@@ -70,16 +65,6 @@ def test_spin_once_serves_a_node_that_is_added_while_it_waits(context: Any, exec
     thread.join(DEADLINE_SEC)
     assert ticked.is_set()
     node.destroy_node()
-
-
-def test_spin_until_future_complete_returns_when_a_callback_sets_it(
-    node: Any,
-    executor: Any,
-) -> None:
-    future = Future()
-    node.create_timer(0.01, lambda: future.set_result(3))
-    executor.spin_until_future_complete(future)
-    assert future.result() == 3
 
 
 def test_spin_until_future_complete_returns_when_a_thread_sets_it(
@@ -129,20 +114,6 @@ def test_spin_until_future_complete_takes_futures_of_the_standard_library(
     executor.spin_until_future_complete(future)
     assert future.result() == 5
     executor.spin_until_future_complete(future, timeout_sec=0)
-
-
-def test_spin_until_future_complete_with_zero_timeout_returns(node: Any, executor: Any) -> None:
-    executor.spin_until_future_complete(Future(), timeout_sec=0)
-
-
-def test_spin_once_until_future_complete_returns_when_it_is_done(
-    node: Any,
-    executor: Any,
-) -> None:
-    future = Future()
-    threading.Timer(0.05, future.set_result, (1,)).start()
-    executor.spin_once_until_future_complete(future, None)
-    assert future.done()
 
 
 @pytest.mark.usefixtures('patient')
@@ -208,16 +179,6 @@ def test_an_exception_of_a_task_is_raised_from_spin(node: Any, executor: Any, ki
         {'function': function, 'coroutine': coroutine, 'suspended': suspended}[kind]
     )
     with pytest.raises(ArithmeticError):
-        executor.spin()
-
-
-def test_an_exception_of_an_async_callback_is_raised_from_spin(node: Any, executor: Any) -> None:
-    async def fail() -> None:
-        await asyncio.sleep(0)
-        raise LookupError
-
-    node.create_timer(0.01, fail)
-    with pytest.raises(LookupError):
         executor.spin()
 
 
@@ -294,9 +255,13 @@ def test_threads_that_spin_once_end_with_the_context(
 
 
 @pytest.mark.parametrize(
-    ('module', 'name'), [(_thread, 'start_new_thread'), (threading, '_start_new_thread')]
+    ('module', 'name', 'how'),
+    [
+        (_thread, 'start_new_thread', 'spin'),
+        (threading, '_start_new_thread', 'spin_once'),
+        (threading, '_start_new_thread', 'spin_until_future_complete'),
+    ],
 )
-@pytest.mark.parametrize('how', ['spin', 'spin_once', 'spin_until_future_complete'])
 def test_what_finds_no_thread_raises_and_leaves_nothing_behind(
     node: Any, executor: Any, monkeypatch: Any, module: Any, name: str, how: str
 ) -> None:
@@ -407,9 +372,3 @@ except ComposerError as error:
 """
     output, _ = start_program('-c', program).communicate(timeout=DEADLINE_SEC)
     assert output.startswith('the executor needs rclpy 7.1 (ROS 2 Jazzy) or newer')
-
-
-def test_num_threads_means_what_it_does_in_rclpy(context: Context) -> None:
-    executor = ComposerExecutor(num_threads=3, context=context)
-    assert executor._executor._max_workers == 3
-    executor.shutdown()

@@ -32,7 +32,7 @@ pytestmark = [
     # rclpy notes a goal's future after its request is sent: an answer may be quicker.
     pytest.mark.filterwarnings('ignore:Unhandled exception in done callback.*not in list'),
 ]
-STRESS_SEC = float(os.environ.get('COMPOSER_STRESS_SEC', '3'))
+STRESS_SEC = float(os.environ.get('COMPOSER_STRESS_SEC', '2'))
 
 
 class Churn:

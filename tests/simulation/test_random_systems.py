@@ -101,7 +101,7 @@ def _create_system(seed):
 @pytest.mark.parametrize('seed', range(SYSTEMS))
 def test_random_systems_are_repeatable_and_keep_orders(simulate, seed):
     text = _create_system(seed)
-    for shuffle in (None, 1, 2):
+    for shuffle in (None, 1):
         first, again = (_run(simulate, text, shuffle) for _ in range(2))
         assert [render_event(each) for each in first] == [render_event(each) for each in again]
         assert [each.time_ns for each in first] == sorted(each.time_ns for each in first)
@@ -110,7 +110,7 @@ def test_random_systems_are_repeatable_and_keep_orders(simulate, seed):
 
 def _run(simulate, text, shuffle):
     with simulate(text, CODE, is_shuffled=shuffle is not None, seed=shuffle or 0) as system:
-        system.forward(2.0)
+        system.forward(1.2)
     assert not [each for each in system.events if each.kind == 'error']
     return system.events
 

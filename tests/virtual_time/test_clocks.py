@@ -112,62 +112,6 @@ def test_nanoseconds_are_exact():
         assert (time.time_ns(), time.monotonic_ns()) == (first[0] + passed, first[1] + passed)
 
 
-@pytest.mark.parametrize(
-    'call',
-    [
-        lambda: time.sleep(-1),
-        lambda: time.sleep('a'),
-        time.sleep,
-        lambda: time.sleep(float('nan')),
-        lambda: time.sleep(float('inf')),
-        lambda: time.sleep(1e12),
-        lambda: time.time(1),
-        time.clock_gettime,
-        lambda: time.clock_gettime('a'),
-        lambda: time.clock_gettime(12345),
-        lambda: time.localtime('a'),
-        lambda: time.localtime(1, 2),
-        time.strftime,
-        lambda: time.strftime('%Y', 3),
-        lambda: time.asctime(1),
-        lambda: datetime.now('UTC'),
-        lambda: datetime.now(1, 2),
-        lambda: datetime.utcnow(1),
-        lambda: threading.Lock().acquire('a', 'b'),
-        lambda: threading.Lock().acquire(True, -2),
-        lambda: threading.Lock().acquire(False, 1),
-        lambda: threading.Lock().acquire(timeout=1e12),
-        lambda: threading.Lock().acquire(timeout=None),
-        lambda: threading.RLock().acquire(False, 1),
-        lambda: threading.RLock().acquire(True, -2),
-        lambda: threading.RLock().acquire(timeout='a'),
-        lambda: threading.Lock().acquire(wrong=1),
-        lambda: os.urandom(-1),
-        lambda: os.urandom('a'),
-        lambda: __import__('queue').SimpleQueue().get(timeout=-1),
-        lambda: __import__('queue').SimpleQueue().get(timeout='a'),
-        lambda: __import__('select').select([], []),
-        lambda: __import__('select').select([], [], [], 'a'),
-        lambda: __import__('select').select([], [], [], -1),
-        lambda: __import__('select').select([-1], [], [], 1),
-        lambda: __import__('select').poll().poll('a'),
-        lambda: __import__('select').epoll().poll('a'),
-        lambda: __import__('_thread').start_new_thread(1, ()),
-        lambda: __import__('_thread').start_new_thread(len, 1),
-        lambda: __import__('_thread').start_new_thread(len, (), 1),
-        lambda: threading.Thread().join(),
-    ],
-    ids=range(41),
-)
-def test_wrong_arguments_are_refused_as_ever(call):
-    """Each of these raises the same class of error, in virtual time and without."""
-    with pytest.raises(Exception) as real:  # noqa: PT011 - whatever it is
-        call()
-    with virtual_time(), pytest.raises(Exception) as virtual:  # noqa: PT011
-        call()
-    assert type(virtual.value) is type(real.value)
-
-
 def test_other_threads_have_real_time():
     seen = []
 

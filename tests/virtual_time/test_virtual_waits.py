@@ -71,13 +71,6 @@ def _reentrant_lock():
         lock.release()
 
 
-def _reentrant_lock_in_vain():
-    lock = threading.RLock()
-    _after(0, lock.acquire)
-    sleep(0.5)
-    assert not lock.acquire(timeout=2.5)
-
-
 def _condition():
     condition = threading.Condition()
     found = []
@@ -104,20 +97,10 @@ def _condition_held_twice():
         assert condition.wait(10)
 
 
-def _condition_in_vain():
-    condition = threading.Condition()
-    with condition:
-        assert not condition.wait(3)
-
-
 def _event():
     event = threading.Event()
     _after(3, event.set)
     assert event.wait()
-
-
-def _event_in_vain():
-    assert not threading.Event().wait(3)
 
 
 def _semaphore():
@@ -126,24 +109,11 @@ def _semaphore():
     assert semaphore.acquire(timeout=10)
 
 
-def _bounded_semaphore_in_vain():
-    semaphore = threading.BoundedSemaphore(1)
-    with semaphore:
-        assert not semaphore.acquire(timeout=3)
-    with pytest.raises(ValueError, match='released too many times'):
-        semaphore.release()
-
-
 def _barrier():
     barrier = threading.Barrier(3)
     _after(1, barrier.wait)
     _after(3, barrier.wait)
     barrier.wait()
-
-
-def _broken_barrier():
-    with pytest.raises(threading.BrokenBarrierError):
-        threading.Barrier(2).wait(3)
 
 
 def _queue():
@@ -175,11 +145,6 @@ def _joined_queue():
     items.join()
 
 
-def _priority_queue_in_vain():
-    with pytest.raises(queue.Empty):
-        queue.PriorityQueue().get(timeout=3)
-
-
 def _simple_queue():
     items = queue.SimpleQueue()
     _after(1, items.put, 'a')
@@ -190,13 +155,6 @@ def _simple_queue():
         items.get(block=False)
 
 
-def _timer():
-    ended = threading.Event()
-    timer = threading.Timer(3, ended.set)
-    timer.start()
-    ended.wait()
-
-
 def _canceled_timer():
     timer = threading.Timer(3, pytest.fail)
     timer.start()
@@ -204,11 +162,6 @@ def _canceled_timer():
     timer.cancel()
     timer.join()
     sleep(2)
-
-
-def _pool():
-    with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(lambda each: sleep(each) or each, [1, 2, 2])) == [1, 2, 2]
 
 
 def _pool_time_out():
@@ -241,18 +194,6 @@ def _asyncio_from_a_thread():
         event = asyncio.Event()
         _after(3, asyncio.get_running_loop().call_soon_threadsafe, event.set)
         await event.wait()
-
-    asyncio.run(main())
-
-
-def _asyncio_coroutine_from_a_thread():
-    async def main():
-        loop = asyncio.get_running_loop()
-
-        def ask():
-            return asyncio.run_coroutine_threadsafe(asyncio.sleep(3, 'a'), loop).result()
-
-        assert await asyncio.to_thread(ask) == 'a'
 
     asyncio.run(main())
 
@@ -296,10 +237,6 @@ def _epoll():
     _pipes(wait)
 
 
-def _read_of_a_pipe():
-    _pipes(lambda source: None)
-
-
 def _read_of_a_buffered_pipe():
     source, sink = os.pipe()
     _after(3, os.close, sink)
@@ -323,10 +260,6 @@ def _socket():
         assert here.recvmsg(9)[0] == b'a\n'
 
     _sockets(receive)
-
-
-def _file_of_a_socket():
-    _sockets(lambda here: here.makefile().readline())
 
 
 def _server():
@@ -392,7 +325,7 @@ def test_a_wait_takes_virtual_time(wait):
 
 @pytest.mark.parametrize('wait', _WAITS, ids=lambda each: each.__name__[1:])
 def test_a_shuffled_wait_takes_as_long(wait):
-    for seed in range(5):
+    for seed in range(2):
         with virtual_time(seed) as threads:
             wait()
             assert threads.now_ns == 3_000_000_000
