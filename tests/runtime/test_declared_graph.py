@@ -178,20 +178,6 @@ def test_qos_by_depth_is_otherwise_the_default_of_ros(publisher_of, topic):
     assert profile.liveliness_lease_duration == Infinite
 
 
-def test_qos_by_the_name_of_a_built_in_profile(publisher_of):
-    profile = publisher_of('/qos/by_builtin').qos_profile
-
-    assert profile.reliability is ReliabilityPolicy.BEST_EFFORT
-    assert profile.durability is DurabilityPolicy.VOLATILE
-
-
-def test_qos_by_the_name_of_a_profile_of_the_file(publisher_of):
-    profile = publisher_of('/qos/by_name').qos_profile
-
-    assert profile.reliability is ReliabilityPolicy.RELIABLE
-    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
-
-
 def test_qos_by_policies_starts_from_its_profile_and_differs_where_it_says(publisher_of):
     profile = publisher_of('/qos/by_policies').qos_profile
 

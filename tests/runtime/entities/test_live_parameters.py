@@ -285,13 +285,6 @@ def test_the_reason_of_on_parameters_is_given_and_nothing_changes(change, get):
     assert get('limit', 'judging') == before
 
 
-def test_on_parameters_is_not_heard_about_values_that_are_refused_anyway(child, change):
-    assert change('mode', 'quick', 'judging') == (False, "'quick' is not one of slow, fast")
-    assert change('mode', 'fast', 'judging') == (True, '')
-    child.wait_for_line("asked {'mode': 'fast'}")
-    assert not child.matching('quick')
-
-
 def test_on_parameters_may_be_async(change, get):
     assert change('limit', 11, 'judging_later') == (False, 'too much')
     assert get('limit', 'judging_later') == 1
@@ -323,24 +316,6 @@ def test_on_parameters_hears_an_atomic_change_as_one(child, shared_peer, get):
     assert (result.successful, result.reason) == (False, '7 is too much')
     child.wait_for_line("asked {'limit': 7, 'other': 'b'}")
     assert get('other', 'judging') == 'a'
-
-
-def test_many_async_on_parameters_at_once_do_not_starve_each_other(compose, peer):
-    nodes = '\n'.join(
-        f'  judge_{n}: {{parameters: {{limit: 0}}, on_parameters: parts:judge}}' for n in range(6)
-    )
-    code = """
-        import time
-
-        async def judge(node, changes):
-            time.sleep(0.2)
-    """
-    compose(f'version: 1\nexecutor: {{threads: 2}}\nnodes:\n{nodes}\n', code).wait_until_ready()
-    names = [f'judge_{n}/set_parameters' for n in range(6)]
-    change = Parameter('limit', value=1).to_parameter_msg()
-
-    responses = peer.call_all(SetParameters, names, parameters=[change])
-    assert [response.results[0].successful for response in responses] == [True] * 6
 
 
 OVERRIDDEN = """

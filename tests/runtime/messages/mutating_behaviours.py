@@ -4,17 +4,13 @@ Each case publishes a message when it hears one of the topic `go`, and keeps wha
 all messages have arrived, `judge` changes what was kept and looks for whom else it has changed.
 """
 
-import contextvars
 import copy
 import ctypes
-import itertools
-import sys
 import threading
 import weakref
 from array import array
 from collections import defaultdict
 from functools import cache, partial
-from queue import SimpleQueue
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -217,46 +213,6 @@ def cached():
 
 
 @case(JointState)
-def has_it_in_a_class(node, go):
-    return send(node, Holder.message)
-
-
-class Holder:
-    message = hold(begin(2.0))
-
-
-@case(JointState)
-def has_it_as_a_default(node, go, *, message=HELD[-1][0]):
-    return send(node, message)
-
-
-@case(JointState)
-def has_it_in_a_partial(node, go):
-    send(node, PARTIAL.args[0])
-    PARTIAL(node)
-
-
-def publish_second(message, node):
-    node.publish('out', message)
-
-
-PARTIAL = partial(publish_second, hold(begin(3.0)))
-
-
-@case(JointState)
-def has_it_in_a_closure(node, go):
-    return send(node, recall())
-
-
-def make_recall():
-    message = hold(begin(4.0))
-    return lambda: message
-
-
-recall = make_recall()
-
-
-@case(JointState)
 def has_it_in_arguments(node, go):
     send(node, ARGUMENTS[1])
     node.publish(*ARGUMENTS)
@@ -265,32 +221,6 @@ def has_it_in_arguments(node, go):
 
 
 ARGUMENTS = ('out', hold(begin(5.0)))
-
-
-@case(JointState)
-def has_it_in_an_iterator(node, go):
-    return send(node, next(CYCLE))
-
-
-CYCLE = itertools.cycle([hold(begin(6.0)), hold(begin(7.0))])
-
-
-@case(JointState)
-def has_it_in_a_queue(node, go):
-    queue = SimpleQueue()
-    queue.put(send(node, begin(go.data)))
-    message = queue.get()
-    queue.put(message)
-    LATER.append(lambda: change(queue.get()))
-    return message
-
-
-@case(JointState)
-def has_it_in_a_frame(node, go):
-    message = send(node, begin(go.data))
-    frame = sys._getframe()
-    LATER.append(lambda: change(frame.f_locals['message']))
-    return message
 
 
 @case(JointState)
@@ -323,28 +253,6 @@ def forever(number):
 
 
 @case(JointState)
-def has_it_in_a_context(node, go):
-    context = contextvars.copy_context()
-    message = send(node, begin(go.data))
-    context.run(VARIABLE.set, message)
-    LATER.append(lambda: change(context[VARIABLE]))
-    return message
-
-
-VARIABLE = contextvars.ContextVar('message')
-
-
-@case(JointState)
-def has_seen_it_as_a_debugger(node, go):
-    returned = []
-    sys.setprofile(lambda _frame, _event, value: returned.append(value))
-    message = begin(go.data)
-    sys.setprofile(None)
-    later(*(each for each in returned if isinstance(each, JointState)))
-    return send(node, message)
-
-
-@case(JointState)
 def lets_it_go(node, go):
     return send(node, begin(go.data))
 
@@ -354,14 +262,6 @@ def has_one_pose_thrice(node, go):
     pose = Pose(position=Point(x=go.data))
     message = send(node, PoseArray(poses=[pose, pose, pose]))
     del pose
-    return message
-
-
-@case(PoseArray)
-def has_a_point_of_two_poses(node, go):
-    point = Point(x=go.data)
-    message = send(node, PoseArray(poses=[Pose(position=point), Pose(position=point)]))
-    later(point)
     return message
 
 
@@ -425,13 +325,6 @@ def has_a_view_of_the_array(node, go):
 
 
 @case(Image)
-def has_the_memory_of_the_array(node, go):
-    message = Image(data=bytes(12))
-    later(np.asarray(memoryview(message.data)[3:]))
-    return send(node, message)
-
-
-@case(Image)
 def finds_the_array_by_a_weak_reference(node, go):
     message = Image(data=bytes(12))
     weak = weakref.ref(message.data)
@@ -447,26 +340,12 @@ def has_a_view_of_numpy(node, go):
 
 
 @case(Imu)
-def has_the_memory_of_numpy(node, go):
-    message = Imu()
-    later(np.asarray(memoryview(message.orientation_covariance)))
-    return send(node, message)
-
-
-@case(Imu)
 def shows_memory_of_its_own(node, go):
     message = Imu()
     memory = (ctypes.c_double * 9)()
     # As a class derived from the message may do.
     message._orientation_covariance = np.ctypeslib.as_array(memory)
     LATER.append(lambda: memory.__setitem__(0, 7.0))
-    return send(node, message)
-
-
-@case(Arrays)
-def shows_the_same_memory_twice(node, go):
-    message = Arrays()
-    message._float64_values = message._float64_values_default[:]
     return send(node, message)
 
 

@@ -55,11 +55,6 @@ class Outsider:
         """Publish texts."""
         self._do('publish', name, texts)
 
-    def kill(self):
-        """End it without a word to anybody."""
-        self._process.kill()
-        self.close()
-
     def close(self):
         """End it."""
         self._process.stdin.close()

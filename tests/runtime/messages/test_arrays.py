@@ -106,12 +106,6 @@ def test_what_holds_no_array_is_refused(given, got):
     )
 
 
-def test_a_view_of_other_things_than_octets_is_refused():
-    view = memoryview(np.zeros(2, '>f8'))
-    for message_class in (UInt8MultiArray, Float64MultiArray, ByteMultiArray):
-        assert 'got memoryview <memory at' in finding(message_class, {'data': view})
-
-
 def test_a_matrix_is_laid_out_row_by_row():
     matrix = np.arange(36.0).reshape(6, 6)
     row_by_row = list(range(36))
@@ -149,14 +143,11 @@ def test_empty_arrays_have_no_items_of_a_wrong_type():
         ),
         ('int8', [0, True, 1], '[1]: expected int8, got bool True'),
         ('int8', [0, 1.0, 1], '[1]: expected int8, got float 1.0'),
-        ('int8', np.array([0, 1, 128]), '[2]: expected int8 (-128 to 127), got int 128'),
         ('uint8', np.array([0, -1, 1]), '[1]: expected uint8 (0 to 255), got int -1'),
         ('int8', np.array([0.0, 1.0, 1.0]), '[0]: expected int8, got float 0.0'),
         ('int8', np.array([True, False, True]), '[0]: expected int8, got bool True'),
-        ('int8', array('d', [0, 1, 2]), '[0]: expected int8, got float 0.0'),
         ('float64', [0.0, 1, True], '[2]: expected float64, got bool True'),
         ('float64', np.array([True, False, True]), '[0]: expected float64, got bool True'),
-        ('float64', [0.0, 1, '2'], "[2]: expected float64, got str '2'"),
         ('float64', [0.0, 1, 10**400], '[2]: expected float64, got an integer beyond its range'),
         ('float64', np.array([1j, 1, 1]), '[0]: expected float64, got complex 1j'),
         ('float32', [0, 1e39, 1], '[1]: expected float32 (up to 3.402823e+38), got float 1e+39'),
@@ -167,8 +158,6 @@ def test_empty_arrays_have_no_items_of_a_wrong_type():
         ),
         ('bool', [True, 1, True], '[1]: expected bool, got int 1'),
         ('byte', [0, 256, 0], '[1]: expected byte (0 to 255), got int 256'),
-        ('byte', [0, b'ab', 0], "[1]: expected byte, got bytes b'ab'"),
-        ('string', ['a', 'b', 3], '[2]: expected string, got int 3'),
         (
             'basic_types',
             [{}, {'int8_value': 300}, {}],
@@ -198,12 +187,6 @@ def test_the_number_of_items_is_checked(name, container):
         )
     shorter = convert(BoundedSequences, {f'{name}_values': container([item])})
     assert len(getattr(shorter, f'{name}_values')) == 1
-
-
-def test_a_list_too_long_is_told_by_its_length_before_its_items():
-    assert finding(BoundedSequences, {'int8_values': ['a'] * 4}) == (
-        'test_msgs/msg/BoundedSequences: int8_values: expected int8[<=3], got 4 items'
-    )
 
 
 def test_infinities_and_nan_are_kept():

@@ -139,13 +139,6 @@ def test_the_times_of_rclpy_stand_for_their_messages():
     )
 
 
-def test_a_time_beyond_its_message_is_refused():
-    assert failure(Header, {'stamp': RclpyTime(seconds=2**32)})[0] == (
-        'std_msgs/msg/Header: stamp.sec: expected int32 (-2147483648 to 2147483647), '
-        'got int 4294967296'
-    )
-
-
 def test_a_message_is_returned_itself():
     twist = Twist(linear=Vector3(x=1.0))
     linear = twist.linear
@@ -199,15 +192,9 @@ def test_what_a_message_holds_in_another_form_is_replaced_in_place():
                 '2147483647), got int 2147483648'
             ),
         ),
-        (Int32(data=1.0), 'std_msgs/msg/Int32: data: expected int32, got float 1.0'),
-        (Bool(data=1), 'std_msgs/msg/Bool: data: expected bool, got int 1'),
         (
             Twist(linear=None),
             ('geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, got None'),
-        ),
-        (
-            Twist(linear=Vector3(y='1')),
-            ("geometry_msgs/msg/Twist: linear.y: expected float64, got str '1'"),
         ),
         (
             Polygon(points=[Point32(), Point32(z=None)]),
@@ -242,20 +229,8 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message, finding):
         ),
         (
             Twist,
-            {3: 1},
-            'geometry_msgs/msg/Twist has no field 3',
-            'its fields are linear, angular',
-        ),
-        (
-            Twist,
             1.0,
             'expected geometry_msgs/msg/Twist, got float 1.0',
-            'give its fields by name: linear, angular',
-        ),
-        (
-            Twist,
-            None,
-            'expected geometry_msgs/msg/Twist, got None',
             'give its fields by name: linear, angular',
         ),
         (
@@ -273,42 +248,12 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message, finding):
             'expected geometry_msgs/msg/Twist, got geometry_msgs/msg/Vector3',
             'give its fields by name: linear, angular',
         ),
-        (
-            String,
-            Int32(),
-            'expected std_msgs/msg/String, got std_msgs/msg/Int32',
-            'give its fields by name: data',
-        ),
         (String, None, 'std_msgs/msg/String: data: expected string, got None', None),
-        (
-            String,
-            String,
-            (
-                'std_msgs/msg/String: data: expected string, got Metaclass_String '
-                "<class 'std_msgs.msg._string.String'>"
-            ),
-            None,
-        ),
         (Empty, 0, 'expected std_msgs/msg/Empty, got int 0', 'it has no fields: write {}'),
-        (
-            Empty,
-            {'structure_needs_at_least_one_member': 0},
-            "std_msgs/msg/Empty has no field 'structure_needs_at_least_one_member'",
-            'it has no fields',
-        ),
         (
             Polygon,
             [{'x': 1}, {'x': True}],
             'geometry_msgs/msg/Polygon: points[1].x: expected float32, got bool True',
-            None,
-        ),
-        (
-            Polygon,
-            Vector3(),
-            (
-                'geometry_msgs/msg/Polygon: points: expected '
-                'geometry_msgs/msg/Point32[], got geometry_msgs/msg/Vector3'
-            ),
             None,
         ),
         (

@@ -115,46 +115,38 @@ def services_of(graph, wait_for):
     return seen
 
 
-@pytest.mark.parametrize(
-    ('node', 'namespace', 'expected'),
-    [
-        ('plain', '/', PARAMETER_SERVICES),
-        ('with_parameters', '/', PARAMETER_SERVICES),
-        ('with_a_hook', '/', PARAMETER_SERVICES),
-        ('lean', '/', set()),
-        ('spared', '/', set()),
-        ('silent', '/', PARAMETER_SERVICES),
-        ('described', '/deep', PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE),
-        ('levelled', '/', PARAMETER_SERVICES | LOGGER_SERVICES),
-        ('all_of_them', '/', PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE | LOGGER_SERVICES),
-    ],
-)
-def test_a_node_has_the_services_that_the_file_asks_for_and_no_others(
-    services_of, wait_for, node, namespace, expected
-):
-    wait_for(lambda: services_of(node, namespace) >= expected, 'the services')
-    assert services_of(node, namespace) == expected
+SERVICES = {
+    ('plain', '/'): PARAMETER_SERVICES,
+    ('with_parameters', '/'): PARAMETER_SERVICES,
+    ('with_a_hook', '/'): PARAMETER_SERVICES,
+    ('lean', '/'): set(),
+    ('spared', '/'): set(),
+    ('silent', '/'): PARAMETER_SERVICES,
+    ('described', '/deep'): PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE,
+    ('levelled', '/'): PARAMETER_SERVICES | LOGGER_SERVICES,
+    ('all_of_them', '/'): PARAMETER_SERVICES | TYPE_DESCRIPTION_SERVICE | LOGGER_SERVICES,
+}
+TOPICS = {
+    'plain': {'/rosout', '/parameter_events'},
+    'spared': {'/rosout', '/parameter_events'},
+    'lean': {'/rosout'},
+    'silent': {'/parameter_events'},
+}
 
 
-@pytest.mark.parametrize(
-    ('node', 'topics'),
-    [
-        ('plain', {'/rosout', '/parameter_events'}),
-        ('with_parameters', {'/rosout', '/parameter_events'}),
-        ('spared', {'/rosout', '/parameter_events'}),
-        ('lean', {'/rosout'}),
-        ('silent', {'/parameter_events'}),
-    ],
-)
-@pytest.mark.usefixtures('services_of')
-def test_a_node_publishes_its_log_and_what_becomes_of_its_parameters(
-    graph, wait_for, node, topics
+def test_a_node_has_the_services_and_topics_that_the_file_asks_for_and_no_others(
+    graph, services_of, wait_for
 ):
-    def seen():
+    for key, expected in SERVICES.items():
+        wait_for(lambda: services_of(*key) >= expected, f'the services of {key}')  # noqa: B023
+        assert services_of(*key) == expected, key
+
+    def topics_of(node):
         return {name for name, _ in graph.get_publisher_names_and_types_by_node(node, '/')}
 
-    wait_for(lambda: seen() >= topics, 'the topics')
-    assert seen() == topics
+    for node, topics in TOPICS.items():
+        wait_for(lambda: topics_of(node) >= topics, f'the topics of {node}')  # noqa: B023
+        assert topics_of(node) == topics, node
 
 
 def test_services_that_were_asked_for_answer(graph, shared_peer, wait_for):
@@ -320,14 +312,10 @@ def test_parameters_are_served_beside_a_behaviour_that_blocks_and_after_a_restar
         assert 'use_sim_time' in response.result.names
 
 
-@pytest.mark.parametrize(
-    ('moment', 'codes'),
-    # The system may be up before the signal of a stop in `on_start` arrives.
-    [('ready in', {0}), ('not a moment', {0, 130})],
-)
-def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose, moment, codes):
+def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose):
     nodes = ''.join(f'  node_{number}: {{}}\n' for number in range(60))
     child = compose(f'version: 1\nnodes:\n  first: {{on_start: parts:announce}}\n{nodes}', CODE)
-    child.wait_for_line(moment)
-    assert child.stop() in codes
+    child.wait_for_line('not a moment')
+    # The system may be up before the signal of a stop in `on_start` arrives.
+    assert child.stop() in {0, 130}
     assert not child.matching('ERROR')

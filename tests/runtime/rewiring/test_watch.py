@@ -267,24 +267,6 @@ def test_nodes_that_hang_in_on_stop_make_way(running):
     assert not running.child.matching('did not end in time')
 
 
-def test_the_current_folder_may_change(running):
-    """Also to one with a folder `sys`, which is no module."""
-    running.edit('import time\n', "import os, sys\nimport time\n\nos.chdir('/')\n", 'parts.py')
-    running.reloaded()
-    running.edit("WORD = 'one'", "WORD = 'two'", 'parts.py')
-    running.edit('{step: 1}', '{step: 2}')
-    running.child.wait_for_line('heard two')
-    running.child.wait_for_line('~1 parameter')
-
-
-def test_removed_nodes_stop(running):
-    running.edit('  listener:', '  brief:\n    on_stop: parts:farewell\n  listener:')
-    running.reloaded()
-    running.edit('  brief:\n    on_stop: parts:farewell\n', '')
-    running.reloaded()
-    running.child.wait_for_line('[brief]: farewell')
-
-
 def test_values_set_live_stay(running, peer, wait_for):
     counts = count_of(peer)
     wait_for(lambda: counts, 'the first count')
@@ -310,12 +292,10 @@ def test_values_come_and_go_in_parameter_files(running, peer, wait_for):
         wait_for_steps(step)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
-def test_a_signal_during_a_reload_leaves_nothing(running, number):
+def test_a_signal_during_a_reload_leaves_nothing(running):
     running.edit('  listener:', '  slow:\n    on_start: parts:hang\n  listener:')
     time.sleep(0.3)
-    code = running.child.stop(number)
-    assert code in (0, -signal.SIGKILL)
+    assert running.child.stop(signal.SIGINT) == 0
 
 
 def test_ten_saves_a_second_end_at_the_last(running):
