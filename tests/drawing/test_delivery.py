@@ -42,18 +42,14 @@ def ways(picture):
     ('publisher', 'subscription', 'way'),
     [
         ('', '', ('local', '')),
-        ('qos: sensor_data', 'qos: sensor_data', ('local', '')),
         ('qos: {history: keep_all}', '', ('local', '')),
         ('local_delivery: true', 'read_only: true', ('local', '')),
         ('local_delivery: false', '', ('sent', OFF)),
         ('external: true', '', ('sent', 'external: true')),
-        ('', 'external: true', ('local', '')),
         ('qos: {durability: transient_local}', '', ('sent', 'durability: transient_local')),
         ('', 'qos: system_default', ('sent', 'durability: system_default')),
-        ('qos: {lifespan: 1}', '', ('sent', 'lifespan')),
         ('qos: {deadline: 1}', 'qos: {deadline: 1}', ('sent', 'deadline')),
         ('', 'qos: {liveliness: manual_by_topic}', ('', '')),
-        ('qos: {liveliness: manual_by_topic}', '', ('sent', 'liveliness: manual_by_topic')),
     ],
 )
 def test_the_way_of_messages(draw, publisher, subscription, way):

@@ -126,7 +126,7 @@ LABEL = re.compile(r'label=<((?:[^<>]|<[^<>]*>)*)>')
 
 @settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-    max_examples=60,
+    max_examples=25,
 )
 @given(text=st.text(min_size=1, max_size=20))
 def test_any_name_stays_text_in_dot_and_mermaid(draw, text):

@@ -50,7 +50,6 @@ DEFAULTS = {'name': 'a', 'count': 3, 'rate': 1.0, 'loud': False, 'mode': ''}
     ('words', 'changes'),
     [
         (['a'], {}),
-        (['name:=a'], {}),
         (
             ['b', '7', '0.5', 'true', 'fast'],
             {'name': 'b', 'count': 7, 'rate': 0.5, 'loud': True, 'mode': 'fast'},
@@ -58,9 +57,7 @@ DEFAULTS = {'name': 'a', 'count': 3, 'rate': 1.0, 'loud': False, 'mode': ''}
         (['mode:=very slow', 'a', '5'], {'mode': 'very slow', 'count': 5}),
         (['a', 'mode:='], {}),
         (['', '-7', '-1e3'], {'name': '', 'count': -7, 'rate': -1000.0}),
-        (['a', 'rate:=5'], {'rate': 5.0}),
         (['a', 'count:=0x10'], {'count': 16}),
-        (['7'], {'name': '7'}),
         (['true'], {'name': 'true'}),
         (['name:=x:=y'], {'name': 'x:=y'}),
     ],
@@ -76,17 +73,14 @@ def test_words_give_values_by_name_or_in_the_order_of_the_declarations(words, ch
     [
         ([], "'name' is missing"),
         (['a', 'cuont:=3'], "there is no argument 'cuont' (did you mean 'count'?)"),
-        (['a', 'zzz:=3'], "there is no argument 'zzz'"),
         (['a', 'name:=b'], "'name' is given twice: 'a' and 'b'"),
         (['a', '3', '1', 'true', 'fast', 'x', '-1'],
          "'x' is one argument too many; '-1' is one argument too many"),
         (['a', 'three'], "'count': expected an integer, got 'three'"),
         (['a', '3.0'], "'count': expected an integer, got 3.0"),
-        (['a', ''], "'count': expected an integer, got ''"),
         (['a', 'null'], "'count': expected an integer, got 'null'"),
         (['a', '9223372036854775808'], "'count': 9223372036854775808 does not fit in 64 bits"),
         (['a', 'loud:=yes'], "'loud': expected a bool, got 'yes' (write true)"),
-        (['a', 'loud:=1'], "'loud': expected a bool, got 1"),
         (['a', 'mode:=slow'], "'mode': 'slow' is not one of '', fast, very slow"),
     ],
 )  # fmt: skip
@@ -125,17 +119,13 @@ def test_a_file_without_arguments_says_so():
     ('declaration', 'finding'),
     [
         ('a: {type: [x]}', ('bad-value', '2:18')),
-        ('a: {type: int}', ('bad-value', '2:18')),
         ('a: {defualt: 3}', ('unknown-key', '2:12')),
-        ('a: [1]', ('wrong-type', '2:11')),
         ('a: {default: {b: 1}}', ('wrong-type', '2:21')),
         ('a: {default: fast, type: integer}', ('bad-argument-declaration', '2:21')),
         ('a: {default: 4, choices: [1, 2]}', ('bad-argument-declaration', '2:21')),
         ('a: {choices: [1, two], type: integer}', ('bad-argument-declaration', '2:25')),
-        ('a: {choices: ["{{ b }}"]}', ('bad-argument-declaration', '2:22')),
         ('a..b: 1', ('bad-argument-declaration', '2:8')),
         ('my name: 1', ('bad-argument-declaration', '2:8')),
-        ('true_: 1, "true": 2', ('bad-argument-declaration', '2:18')),
     ],
 )
 def test_a_wrong_declaration_is_said_before_any_word_is_held_against_it(declaration, finding):

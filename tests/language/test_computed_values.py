@@ -89,22 +89,8 @@ def test_a_value_is_computed_after_those_that_it_needs_whatever_the_order_of_the
             [('value-cycle', '2:11', "'a' needs 'c', which needs 'b', which needs 'a'")],
         ),
         (
-            'args: {a: "{{ args | length }}"}',
-            [('value-cycle', '2:11', "'a' needs itself")],
-        ),
-        (
             'args: {a: {type: integer, default: "{{ b }}"}}\nvars: {b: fast}',
             [('bad-argument-declaration', '2:36', "expected an integer, got 'fast'")],
-        ),
-        (
-            'args: {a: {choices: [x, y], default: "{{ b }}"}}\nvars: {b: z}',
-            [
-                (
-                    'bad-argument-declaration',
-                    '2:38',
-                    "the default 'z' is not one of the choices",
-                )
-            ],
         ),
         (
             'args: {a: "{{ [1, 2] }}"}',
@@ -121,8 +107,6 @@ def test_a_value_is_computed_after_those_that_it_needs_whatever_the_order_of_the
         ('vars: {a: "{{ bb }}", b: 1}', [('undefined-name', '2:15', "'bb' is not defined")]),
         # What an argument without a value will be is not known.
         ('args: {n: {type: string}, a: {type: integer, default: "{{ n | int }}"}}', []),
-        ('args: {n: {type: string}, a: {choices: [x, y], default: "{{ n }}"}}', []),
-        ('args: {n: x, a: {choices: ["{{ n }}"], default: "{{ n }}"}}', []),
         ('vars: [a]', [('wrong-type', '2:7', None)]),
     ],
 )

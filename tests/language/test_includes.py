@@ -170,14 +170,6 @@ def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
             ('missing-include', 'robot.yaml:3:16', "there is no file 'amr.yaml'"),
         ),
         (
-            r'{file: "\0"}',
-            ('missing-include', 'robot.yaml:3:16', 'no file has a null character in its name'),
-        ),
-        (
-            '{file: "package://no_such/x.yaml"}',
-            ('uninstalled-package', 'robot.yaml:3:16', "no package 'no_such' is installed"),
-        ),
-        (
             '{file: arm.yaml, args: {side: l, jonts: 3}}',
             ('unknown-argument', 'robot.yaml:3:42', "'arm.yaml' takes no argument 'jonts'"),
         ),
@@ -230,11 +222,6 @@ def test_what_is_wrong_with_an_include_comes_with_the_chain_of_includes(write, i
     assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
 
 
-def test_a_missing_file_comes_with_the_nearest_one(write):
-    path = write(arm=ARM, robot=robot('{file: amr.yaml}'))
-    assert load_system(path).diagnostics[0].help == "did you mean 'arm.yaml'?"
-
-
 # Includes in includes
 
 MIDDLE = """
@@ -257,22 +244,6 @@ def test_a_relative_namespace_stays_relative_through_all_includes(write):
     assert not system.diagnostics
     names = [node.full_name for node in system.spec.nodes.values()]
     assert names == ['/a/left/t', '/a/right/t', '/b/left/t', '/b/right/t']
-
-
-def test_profiles_that_start_from_others_of_one_name_stay_apart(write):
-    path = write(
-        leaf='version: 1\nqos: {base: {depth: 2}, fast: {profile: base}}\nnodes: {}\n',
-        robot=robot(
-            '{file: leaf.yaml}',
-            'qos: {base: {depth: 1}, fast: {profile: base}}\nnodes: {}',
-        ),
-    )
-    assert load_system(path).data['qos'] == {
-        'base': {'depth': 1},
-        'fast': {'profile': 'base'},
-        'part_base': {'depth': 2},
-        'part_fast': {'profile': 'part_base'},
-    }
 
 
 @pytest.mark.parametrize('who', ['robot', 'leaf'])
@@ -300,24 +271,6 @@ def test_a_node_that_is_left_out_takes_no_name(write):
     system = load_system(path)
     assert not system.diagnostics
     assert [node.log_level for node in system.spec.nodes.values()] == ['info']
-
-
-def test_files_that_include_each_other_over_and_over_are_bounded(write):
-    again = '{file: FILE, namespace: "n_{{ i }}", foreach: {i: "{{ range(10) }}"}}'
-    files = {
-        f'f{number}': f'version: 1\ninclude: {{"x_{{{{ i }}}}": {again}}}\nnodes: {{}}\n'.replace(
-            'FILE', f'f{number + 1}.yaml'
-        )
-        for number in range(6)
-    }
-    path = write(
-        **files,
-        f6='version: 1\nnodes: {n: {}}\n',
-        robot=robot('{file: f0.yaml}', 'max_nodes: 50\nnodes: {}'),
-    )
-    (finding,) = load_system(path).diagnostics
-    assert finding.rule == 'too-many-entries'
-    assert finding.message == 'include has more than 50 entries in all files together'
 
 
 def test_what_is_ignored_may_hold_variables_of_foreach(write):
@@ -372,11 +325,6 @@ def switch(real, sim=SIM, **files):
             'args: {ip: {type: string}}\nnodes: {camera: {log_levl: info}}',
             [],
             [('unknown-key', 'real.yaml:3:18', ['robot.yaml:5:16'])],
-        ),
-        (
-            'args: {ip: {type: string}}\ninclude: {x: {file: none.yaml}}',
-            [],
-            [('missing-include', 'real.yaml:3:21', ['robot.yaml:5:16'])],
         ),
         (
             'args: {op: x}\nnodes: {}',
@@ -449,41 +397,6 @@ def test_values_that_hang_on_arguments_are_samples_where_an_include_is_left_out(
     assert (finding.rule, str(finding.span)) == ('argument-type', 'robot.yaml:5:48')
 
 
-@pytest.mark.ros
-def test_what_is_left_out_hides_no_finding_of_what_is_used(write):
-    part = """
-    version: 1
-    args: {kind: {type: string}}
-    nodes: {n: {publishers: {c: {type: "std_msgs/msg/{{ kind }}", external: true}}}}
-    """
-    robot = """
-    version: 1
-    args: {kind: String}
-    include:
-      x: {file: part.yaml, args: {kind: Strng}}
-      y: {file: part.yaml, when: false, args: {kind: "{{ kind }}"}, namespace: y}
-    """
-    system = load_system(write(part=part, robot=robot), [])
-    rules = [each.rule for each in check_system(system, InterfaceCatalogue())]
-    assert 'unknown-type' in rules
-
-
-def test_what_is_left_out_counts_for_no_limit(write):
-    robot = """
-    version: 1
-    max_nodes: 3
-    include:
-      "off_{{ i }}":
-        {foreach: {i: "{{ range(3) }}"}, file: mid.yaml, namespace: "n{{ i }}", when: false}
-      on: {file: mid.yaml}
-    """
-    mid = 'version: 1\ninclude: {leaf: {file: leaf.yaml}, off: {file: leaf.yaml, when: false}}\n'
-    leaf = 'version: 1\nnodes: {a: {}, b: {}, c: {}}\n'
-    system = load_system(write(robot=robot, mid=mid, leaf=leaf))
-    assert not system.diagnostics
-    assert full_names(system) == ['//a', '//b', '//c']
-
-
 @pytest.mark.parametrize('namespace', ['left arm', '9lives', '/a//b', 'a-b', '/left/'])
 def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespace):
     path = write(
@@ -494,13 +407,6 @@ def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespa
     assert message.startswith(f"'{namespace}': ")
     findings_of_nodes = check_system(load_system(path), InterfaceCatalogue([]))
     assert [each.rule for each in findings_of_nodes if each.rule == 'bad-name'] == ['bad-name']
-
-
-def test_a_choice_that_is_misspelt_comes_with_the_nearest(write):
-    part = 'version: 1\nargs: {side: {choices: [left, right]}}\nnodes: {}\n'
-    path = write(robot=robot('{file: part.yaml, args: {side: lfet}}'), part=part)
-    (finding,) = load_system(path).diagnostics
-    assert (finding.rule, finding.help) == ('argument-type', "did you mean 'left'?")
 
 
 def test_what_is_wrong_with_a_file_included_twice_is_left_out_of_both(write):

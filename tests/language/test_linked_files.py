@@ -43,18 +43,11 @@ ARM_FILE = '../other/parts/arm.yaml'
 LAYOUTS = {
     'no link': ('real/configs/robot.yaml', ARM_FILE, {}),
     'file': ('now.yaml', ARM_FILE, {'now.yaml': 'real/configs/robot.yaml'}),
-    'absolute': ('now.yaml', ARM_FILE, {'now.yaml': '{root}/real/configs/robot.yaml'}),
     'link to a link': (
         'now.yaml',
         ARM_FILE,
         {'now.yaml': 'links/next.yaml', 'links/next.yaml': '../real/configs/robot.yaml'},
     ),
-    'beside the file': (
-        'real/configs/now.yaml',
-        ARM_FILE,
-        {'real/configs/now.yaml': 'robot.yaml'},
-    ),
-    'folder': ('links/now/robot.yaml', ARM_FILE, {'links/now': '../real/configs'}),
     'included file': (
         'real/configs/robot.yaml',
         'arm.yaml',

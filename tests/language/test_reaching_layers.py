@@ -101,14 +101,12 @@ def test_a_node_of_its_own_may_stand_beside(load):
             "there is no node '/robot_0/base/lidr' to change",
             "did you mean '/robot_0/base/lidar'?",
         ),
-        ('/robot_2/base/lidar: {timers: {tick: {behaviour: a:b}}}', 'no node', 'did you mean'),
         (
             '/robot_0/base/lidar: {timers: {tikc: {behaviour: parts:tock}}}',
             "there is no timer 'tikc' to change, and for a new one keys are missing",
             "did you mean 'tick'?",
         ),
         ('/robot_0/base/lidar: {worker: null}', "null removes 'worker'", 'there are'),
-        ('/robot_0/base/lidar: {timers: {tick: {period: 1}}}', 'cannot be used', 'keep one'),
         ('/robot_0/base/lidar: {wroker: x}', "unknown key 'wroker'", "did you mean 'worker'?"),
     ],
 )

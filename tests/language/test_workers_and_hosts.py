@@ -43,17 +43,10 @@ def places(spec):
 # What the file says, beside `arm.yaml` with its own words; where `here` and `inner` run.
 PLACES = [
     ('nodes: {here: {}}', '', {'here': ('', '')}),
-    ('nodes: {here: {worker: a}}', '', {'here': ('a', '')}),
     ('nodes: {here: {worker: a, host: x}}', '', {'here': ('a', 'x')}),
-    ('defaults: {worker: a, host: x}\nnodes: {here: {}}', '', {'here': ('a', 'x')}),
     ('defaults: {worker: a}\nnodes: {here: {worker: ""}}', '', {'here': ('', '')}),
     ('workers: {a: {host: x}}\nnodes: {here: {worker: a}}', '', {'here': ('a', 'x')}),
     # The nodes of a worker are together: what one of them says holds for the others.
-    (
-        'nodes: {here: {worker: a}, there: {worker: a, host: x}}',
-        '',
-        {'here': ('a', 'x'), 'there': ('a', 'x')},
-    ),
     # A worker's own host goes before those of defaults and includes.
     (
         'defaults: {host: y}\nworkers: {a: {host: x}}\nnodes: {here: {worker: a}, there: {}}',
@@ -62,11 +55,6 @@ PLACES = [
     ),
     ('include: {arm: {file: arm.yaml}}', '', {'inner': ('', '')}),
     ('include: {arm: {file: arm.yaml, worker: a, host: x}}', '', {'inner': ('a', 'x')}),
-    (
-        'include: {arm: {file: arm.yaml, worker: a, host: x}}',
-        'defaults: {worker: b, host: y}',
-        {'inner': ('b', 'y')},
-    ),
     (
         'include: {arm: {file: arm.yaml, worker: a, host: x}}\nworkers: {a: {host: z}}',
         '',
@@ -78,21 +66,11 @@ PLACES = [
         {'inner': ('b', 'z')},
     ),
     (
-        'defaults: {worker: a, host: x}\ninclude: {arm: {file: arm.yaml}}',
-        '',
-        {'inner': ('a', 'x')},
-    ),
-    (
         'defaults: {worker: a, host: x}\ninclude: {arm: {file: arm.yaml, worker: "", host: y}}',
         '',
         {'inner': ('', 'y')},
     ),
     # An included file declares workers, too; the file around it goes first.
-    (
-        'include: {arm: {file: arm.yaml, worker: a}}',
-        'workers: {a: {host: y}}',
-        {'inner': ('a', 'y')},
-    ),
     (
         'include: {arm: {file: arm.yaml, worker: a}}\nworkers: {a: {host: x}}',
         'workers: {a: {host: y}}',
@@ -136,7 +114,7 @@ NAMES = st.sampled_from(['', 'a', 'b'])
 ENTRIES = st.fixed_dictionaries({}, optional={'worker': NAMES, 'host': NAMES})
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     nodes=st.dictionaries(st.sampled_from('wxyz'), ENTRIES, min_size=1),
     workers=st.dictionaries(

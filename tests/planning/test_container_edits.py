@@ -51,7 +51,6 @@ EDITS = {
             'a process takes this when it starts; lost: the running process'
         ],
     ),
-    'nothing': ('version: 1', 'version: 1\ndescription: told', []),
 }
 
 

@@ -59,16 +59,6 @@ EDITS = {
             'required false → true (old:3 → new:3), log_level = debug (new:3)'
         ],
     ),
-    'less niceness': (
-        ', nice: 5',
-        '',
-        [
-            "± worker 'vision': nice = 5 goes (old:3); a process cannot become less nice; "
-            'lost: the running process',
-            f"± node 'camera' (new:5); its worker starts anew; {LOST}",
-            f"± node 'detector' (new:6); its worker starts anew; {LOST}",
-        ],
-    ),
     'a variable, and a node of the same worker': (
         'OMP: 1}}\nnodes:\n  camera: {worker: vision}\n  detector: {worker: vision, state: {count: 0}}',
         'OMP: 2}}\nnodes:\n  camera: {worker: vision}\n  detector: {worker: vision, state: {count: 0, x: 1}}',
@@ -78,11 +68,6 @@ EDITS = {
             f"± node 'camera' (new:5); its worker starts anew; {LOST}",
             f"± node 'detector': state.x = 1 (new:6); its worker starts anew; {LOST}",
         ],
-    ),
-    'hosts, of a system that runs as a whole': (
-        'workers:\n  vision: {',
-        'defaults: {host: base}\nhosts: {base: {}}\nworkers:\n  vision: {description: told, ',
-        [],
     ),
     'a network': (
         'version: 1',

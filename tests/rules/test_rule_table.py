@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,7 @@ COMPOSED = {'duplicate-field', 'duplicate-constant'} | {
 }
 
 
+@cache
 def names_in_the_code():
     found = set()
     paths = [path for room in SPEAKING for path in (PACKAGE / room).rglob('*.py')]

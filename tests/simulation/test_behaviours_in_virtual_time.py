@@ -11,14 +11,6 @@ START = 'import time\nimport threading\nimport asyncio\nimport rclpy\n'
 
 # Each case: nodes, behaviours, and what they log, with the time.
 CASES = {
-    'a timer': (
-        'n: {timers: {t: {period: 0.5, behaviour: "parts:f"}}}',
-        """
-        def f(node):
-            node.logger.info('f')
-        """,
-        [(0.5, 'f'), (1.0, 'f'), (1.5, 'f'), (2.0, 'f')],
-    ),
     'timers of all clocks': (
         """
         n:
@@ -42,15 +34,6 @@ CASES = {
                 yield
         """,
         [(0.5, 'a'), (1.0, 'b')],
-    ),
-    'a timer that is late': (
-        'n: {timers: {t: {period: 0.5, behaviour: "parts:f"}}}',
-        """
-        def f(node):
-            node.logger.info('f')
-            time.sleep(0.75)
-        """,
-        [(0.5, 'f'), (1.25, 'f'), (2.0, 'f')],
     ),
     'clocks': (
         'n: {on_start: "parts:f"}',
@@ -139,17 +122,6 @@ CASES = {
         """,
         [(1.5, 'hello'), (1.75, 'CallTimeoutError'), (2.0, 'ServiceNotAvailableError')],
     ),
-    'a delay and a condition': (
-        """
-        n: {delay: 1.5, on_start: "parts:f", publishers: {/late: std_msgs/msg/String}}
-        m: {wait_for: {topic: /late}, on_start: "parts:f"}
-        """,
-        """
-        def f(node):
-            node.logger.info(node.name)
-        """,
-        [(1.5, 'n'), (1.5, 'm')],
-    ),
     'an error': (
         'n: {on_error: log, timers: {t: {period: 0.5, behaviour: "parts:f"}}}',
         """
@@ -171,19 +143,6 @@ CASES = {
                 raise ValueError
         """,
         [(0.0, 'begin'), (0.6, 'begin')],
-    ),
-    'created entities': (
-        'n: {on_start: "parts:begin"}',
-        """
-        def begin(node):
-            node.create_publisher('std_msgs/msg/String', 'made')
-            node.create_subscription('std_msgs/msg/String', 'made', hear)
-            node.create_timer(1.0, lambda node: node.publish('made', 'x'))
-
-        def hear(node, message):
-            node.logger.info(message.data)
-        """,
-        [(1.0, 'x'), (2.0, 'x')],
     ),
     'plain entities of rclpy': (
         'n: {on_start: "parts:begin"}',
@@ -261,24 +220,6 @@ CASES = {
         """,
         [(0.25, 'once'), (0.5, 'tick'), (1.0, 'tick'), (1.25, 'twice')],
     ),
-    'parallel callbacks': (
-        """
-        n:
-          timers:
-            a: {period: 1.0, group: reentrant, behaviour: "parts:f", with: {pause: 0.5}}
-            b: {period: 1.0, group: reentrant, behaviour: "parts:f", with: {pause: 0.25}}
-        """,
-        """
-        def f(node, pause: float):
-            node.logger.info(f'begin {pause}')
-            time.sleep(pause)
-            node.logger.info(f'end {pause}')
-        """,
-        [
-            (1.0, 'begin 0.5'), (1.0, 'begin 0.25'), (1.25, 'end 0.25'), (1.5, 'end 0.5'),
-            (2.0, 'begin 0.5'), (2.0, 'begin 0.25'),
-        ],
-    ),
     'one callback after the other': (
         """
         n:
@@ -327,19 +268,6 @@ CASES = {
             node.logger.info(message.data)
         """,
         [(2.0, 'a'), (2.0, 'B'), (2.0, 'b'), (2.0, 'C'), (2.0, 'c')],
-    ),
-    'missed deadlines': (
-        """
-        n: {publishers: {/d: {type: std_msgs/msg/String, qos: {deadline: 0.5}, on_deadline_missed: "parts:miss"}}, timers: {t: {period: 1.25, behaviour: "parts:f", publish: /d}}}
-        """,
-        """
-        def f(node):
-            return 'x'
-
-        def miss(node, event):
-            node.logger.info(str(event.total_count))
-        """,
-        [(1.75, '1')],
     ),
     'parameters': (
         """

@@ -103,7 +103,7 @@ def test_the_same_system_runs_again_and_again(simulate):
     """Nothing of a run is left in the next: no module's global, no thread, no chance."""
     threads, modules = threading.active_count(), set(sys.modules)
     traces = set()
-    for _ in range(5):
+    for _ in range(3):
         with simulate(TALKER, CODE) as system:
             system.call('/ask')
             system.forward(3.0)

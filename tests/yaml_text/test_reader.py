@@ -198,31 +198,14 @@ def test_a_duplicate_key_shows_both_places():
     ('text', 'line'),
     [
         ('', 'file.yaml: error[unreadable-file]: the file is empty'),
-        ('\n\n# only a comment\n', 'file.yaml: error[unreadable-file]: the file is empty'),
         ('\ufeff', 'file.yaml: error[unreadable-file]: the file is empty'),
         (
             '- version: 1',
             'file.yaml:1:1: error[wrong-type]: a file must be a mapping with the keys version and nodes',
         ),
         (
-            '\n  hello',
-            'file.yaml:2:3: error[wrong-type]: a file must be a mapping with the keys version and nodes',
-        ),
-        (
-            '--- ~',
-            'file.yaml:1:5: error[wrong-type]: a file must be a mapping with the keys version and nodes',
-        ),
-        (
             b'version: 1\nname: caf\xe9\n',
             'file.yaml: error[unreadable-file]: the file is not UTF-8: byte 0xe9 in line 2',
-        ),
-        (
-            'version: 1'.encode('utf-16'),
-            'file.yaml: error[unreadable-file]: the file is not UTF-8: byte 0xff in line 1',
-        ),
-        (
-            'a: "é日x\0"',
-            'file.yaml:1:8: error[yaml-syntax]: YAML does not allow the character U+0000',
         ),
         (
             'a: é\r\nb: é\r\nc: \x1b[31m',
@@ -244,14 +227,10 @@ def test_an_unreadable_text_gets_one_clear_line(text, line):
         ('a:\n\tb: 1\n', 2, 1, 'indent YAML with spaces, not tabs'),
         ('a: b: c\n', 1, 5, "put a value that contains ': ' in quotes"),
         ('a:1.5\nb: 3\n', 1, 1, "write 'a: 1.5'"),
-        ('t:\n  a: 1\n  b:2.0  # s\n\n  c: 3\n', 3, 3, "write 'b: 2.0'"),
         ('t:\n  - b:x.y\n    c: 3\n', 2, 5, "write 'b: x.y'"),
         ('a: [1, 2\nb: 3\n', 2, 2, "close the bracket with ']'"),
-        ('a: {b: 1\n', 2, 1, "close the bracket with '}'"),
-        ('a: "b\n', 1, 4, None),
         ('a:\n  b: 1\n c: 2\n', 3, 2, 'indent all keys of a mapping alike'),
         ('a: @b\n', 1, 4, 'put a value that begins with it in quotes'),
-        ('a: !x!y z\n', 1, 4, None),
         ('a: "\\q"\n', 1, 5, None),
         ('%YAML 9.9\n---\na: 1\n', 1, 1, None),
     ],
@@ -327,14 +306,11 @@ def test_yaml_is_read_by_the_core_schema():
     [
         ('a: !own 1', "1:4: error[bad-scalar]: the tag !own is not part of YAML's core schema"),
         ('a: !!int x', "1:4: error[bad-scalar]: 'x' is not a !!int"),
-        ('a: !!set {b}', '1:4: error[bad-tag]: a !!set is not allowed here'),
         (
             'a: !!python/object/apply:os.system [x]',
             '1:4: error[bad-tag]: a !!python/object/apply:os.system is not allowed here',
         ),
-        ('a: !!map [b]', '1:4: error[bad-tag]: a !!map is not allowed here'),
         ('1: a', '1:1: error[bad-key]: a key must be a string, and 1 is not'),
-        ('null: a', '1:1: error[bad-key]: a key must be a string, and null is not'),
         ('?\n: a', '1:2: error[bad-key]: a key must be a string, and this one is empty'),
         ('[a]: b', '1:1: error[bad-key]: a key must be a string, not a list or a mapping'),
     ],

@@ -14,18 +14,14 @@ NAME = 'tests/robot.scenario.yaml::stops at an obstacle'
     ('text', 'is_meant'),
     [
         ('stops', True),
-        ('STOPS', True),
         ('robot.scenario', True),
         ('starts', False),
         ('not starts', True),
-        ('stops and obstacle', True),
         ('stops and starts', False),
         ('starts or stops', True),
         ('not (starts or stops)', False),
-        ('not starts and stops', True),
         ('starts and stops or obstacle', True),
         ("'stops at an'", True),
-        ('"at obstacle"', False),
     ],
 )
 def test_words_are_parts_of_names(text, is_meant):

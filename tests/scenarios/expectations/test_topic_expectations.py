@@ -25,23 +25,16 @@ SCANS = [
     [
         {'topic': 'ramp'},
         {'topic': '/ramp', 'where': 'data == 3', 'within': [3, 3]},
-        {'topic': '/ramp', 'where': 'message.data > 1', 'count': 4},
         {'topic': '/ramp', 'count': [6, 9]},
         {'topic': '/ramp', 'never': 'data > 5'},
-        {'topic': '/ramp', 'never': 'data > 3', 'within': [0, 3.5]},
-        {'topic': '/ramp', 'where': 'data > 5', 'never': True},
         {'topic': '/ramp', 'where': 'data > 4', 'never': 'data < 5'},
-        {'topic': '/other', 'never': True},
         {'topic': '/ramp', 'eventually': 'data == 5'},
         {'topic': '/ramp', 'message': {'data': 2.01}, 'tolerance': 0.01},
         {'topic': '/ramp', 'message': 2, 'within': [2, 2]},
-        {'topic': '/scan', 'where': "frame == 'laser' and ranges | length == 1"},
         {'topic': '/scan', 'message': {'origin': {'x': 2}}, 'count': 1},
         {'topic': '/ramp', 'rate': [1, 1], 'between': [0, 6]},
-        {'topic': '/ramp', 'rate': [0.6, 0.6]},
         {'order': [{'topic': '/ramp', 'where': 'data == 1'}, {'topic': '/scan'}, {'topic': '/ramp'}]},
         {'topic': '/status', 'where': 'level == 2 and flags[0] == 1 and flags | sum < level'},
-        {'topic': '/status', 'never': 'level != 2'},
         {'topic': '/status', 'message': {'level': 2, 'flags': [1, 0]}},
     ],
 )  # fmt: skip
@@ -53,11 +46,6 @@ def test_what_holds_says_nothing(said, then):
 @pytest.mark.parametrize(
     ('then', 'message', 'diff'),
     [
-        (
-            {'topic': '/ramp', 'where': 'data == 9', 'within': [2, 3]},
-            'expected a message on /ramp where data == 9 from 2 s to 3 s, got none among 2 messages',
-            ['+ {data: 3.0}'],
-        ),
         (
             {'topic': '/ramp', 'where': 'data == 5', 'within': [2, 3.5]},
             'expected a message on /ramp where data == 5 from 2 s to 3.5 s, got none among '
@@ -78,11 +66,6 @@ def test_what_holds_says_nothing(said, then):
             {'topic': '/ramp', 'count': [1, 2]},
             'expected 1 to 2 messages on /ramp, got 6 messages, the first too many at 2 s',
             ['+ {data: 2.0}'],
-        ),
-        (
-            {'topic': '/ramp', 'count': 7},
-            'expected 7 messages on /ramp, got 6',
-            [],
         ),
         (
             {'topic': '/scan', 'message': {'frame': 'laser', 'origin': {'x': 3, 'y': 0}}},

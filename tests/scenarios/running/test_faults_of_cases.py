@@ -104,14 +104,6 @@ cases:
       - {log: talker, text: bye, count: 0, within: [0, 1.9]}
       - {topic: /said, count: 0, within: [0.56, 1.14]}
       - {topic: /said, count: 14}
-  started before it would be again:
-    when: [{at: 0.55, kill: drivers}, {at: 0.75, start: talker}, {at: 1.25, stop: drivers}]
-    then:
-      - {topic: /said, where: data == 'hello 0', count: 2}
-      - {topic: /said, count: 0, within: [1.26, 2]}
-  a part of a worker:
-    when: [{at: 0.55, kill: talker}, {at: 0.65, kill: drivers}]
-    then: [{topic: /said, where: data == 'hello 0', count: 2}, {topic: /said, count: 0, within: [0.56, 1.2]}]
   restarted:
     when: [{at: 0.55, restart: drivers}]
     then: [{topic: /said, where: data == 'hello 0', count: 2}]
@@ -152,7 +144,7 @@ def run(name, folder, domain_id):
 def test_faults_do_what_they_say(project, domain_id):
     code, output = run('faults.scenario.yaml', project, domain_id)
     assert code == 0, output
-    assert '10 passed' in output
+    assert '8 passed' in output
     code, output = run('wrong.scenario.yaml', project, domain_id)
     assert code == 1
     assert "node '/talker' does not run" in output
@@ -165,13 +157,10 @@ def test_faults_do_what_they_say(project, domain_id):
     [
         ('kill: takler', "there is no node 'takler' in this system"),
         ('stop: drivres', "did you mean 'drivers'?"),
-        ('start: /nobody/talker', "there is no node '/nobody/talker'"),
         ('drop: /siad', "the system has no topic '/siad'"),
         ('delay: /said', "'delay' requires 'by'"),
-        ('drop: /said, by: 1', "'by' requires 'delay'"),
         ('kill: talker, for: 1', "'kill' and 'for' cannot be used together"),
         ('drop: /said, type: std_msgs/msg/String', "'drop' and 'type' cannot be used together"),
-        ('kill: talker, stop: talker', "'stop' and 'kill'"),
     ],
 )
 def test_what_is_not_there_is_a_finding(project, step, expected, monkeypatch, capsys):
