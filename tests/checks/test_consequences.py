@@ -90,11 +90,6 @@ def test_a_bad_name_hides_only_ends_of_its_type(check):
     assert sorted(found) == [(4, 'bad-name'), (5, 'unknown-publisher'), (11, 'no-publisher')]
 
 
-def test_a_namespace_that_all_share_hides_nobody_who_is_alone(check):
-    found = check(PUBLISHES, CODE, before='defaults: {namespace: a-b}\n', installed=False)
-    assert found == [(2, 'bad-name'), (5, 'no-subscription')]
-
-
 @pytest.mark.parametrize('qos', ['nowhere', '{profile: nowhere, depth: 3}'])
 def test_a_qos_with_an_unknown_profile_matches_everything(check, qos):
     talker = f"""
@@ -107,14 +102,6 @@ def test_a_qos_with_an_unknown_profile_matches_everything(check, qos):
       numbers: {{type: std_msgs/msg/Int32, publish: copies, qos: {{durability: transient_local}}}}
 """
     assert check(talker, installed=False) == [(4, 'unknown-qos-profile')]
-
-
-@pytest.mark.parametrize('value', ['-1', 'soon', '[1]'])
-def test_a_qos_with_a_finding_in_its_profile_matches_everything(check, value):
-    before = f'qos: {{kept: {{deadline: {value}, depth: 3}}}}\n'
-    nodes = spoil(SYSTEM, '{chatter: std_msgs/msg/String}', '{chatter: {type: std_msgs/msg/String, qos: kept}}')  # fmt: skip
-    nodes = spoil(nodes, 'behaviour: parts', 'qos: {deadline: 1}, behaviour: parts')
-    assert [line for line, _ in check(nodes, CODE, before=before, installed=False)] == [2]
 
 
 @pytest.mark.ros
@@ -190,16 +177,6 @@ def test_a_parameter_file_may_be_for_a_node_without_a_right_name(check, tmp_path
     parameter_files: [site.yaml]
 """
     assert check(nodes) == [(3, 'bad-name')]
-
-
-def test_nodes_whose_includes_have_no_right_namespace_are_not_the_same(check, tmp_path):
-    (tmp_path / 'part.yaml').write_text('version: 1\nnodes: {camera: {}}\n')
-    before = """\
-include:
-  left: {file: part.yaml, namespace: 1}
-  right: {file: part.yaml, namespace: 2}
-"""
-    assert check('  n: {}\n', before=before) == [(3, 'wrong-type'), (4, 'wrong-type')]
 
 
 def test_a_file_that_cannot_be_included_may_have_any_other_end(check):

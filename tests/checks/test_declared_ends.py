@@ -50,20 +50,15 @@ def test_a_system_whose_processes_have_what_its_nodes_need_has_no_findings():
     ('old', 'new', 'rule', 'said'),
     [
         ('msg/Image,', 'msg/CompressedImage,', 'conflicting-types', 'image'),
-        ('srv/SetCameraInfo', 'srv/Trigger', 'unknown-type', 'sensor_msgs'),
         ('sensor_msgs/srv/SetCameraInfo', 'std_srvs/srv/Trigger', 'conflicting-types', 'service'),
-        ('action/Fibonacci', 'action/LookUp', 'unknown-type', 'LookUp'),
         ('{reliability: best_effort}', '{liveliness: manual}', 'bad-value', 'manual_by_topic'),
         ('    image:', '    imgae:', 'no-publisher', '/image'),
-        ('    image:', '    "im age":', 'bad-name', 'im age'),
         ('{set_camera_info:', '{set_info:', 'no-server', '/set_camera_info'),
-        ('{fibonacci:', '{fib:', 'no-server', '/fibonacci'),
         ('  publishers:', '  namespace: left\n  publishers:', 'no-publisher', '/image'),
         ('  publishers:', '  remap: {image: picture}\n  publishers:', 'no-publisher', '/image'),
         ('  publishers:', '  publisher:', 'unknown-key', 'publisher'),
         ('{cmd_vel:', '{cmd_vle:', 'no-subscription', '/cmd_vel'),
         ('qos: {reliability: best_effort}', 'qos: sensor_dat', 'unknown-qos-profile', 'sensor'),
-        ('debug: std_msgs', 'debug: std_msg', 'unknown-type', 'std_msg'),
     ],
 )
 def test_a_mistake_in_a_declaration_is_found(old, new, rule, said):
@@ -214,13 +209,10 @@ robot:
     ('given', 'finding'),
     [
         ('rate: 1.0, gains: {p: 2.0}, mode: slow, use_sim_time: true', None),
-        ('qos_overrides./scan.publisher.depth: 5', None),
         ('rate: 1', ('refused-parameter', 'write 1.0')),
-        ('rate: 6.0', ('refused-parameter', None)),
         ('mode: slwo', ('refused-parameter', "did you mean 'slow'?")),
         ('gains: {p: x}', ('refused-parameter', None)),
         ('rat: 1.0', ('undeclared-parameter', "did you mean 'rate'?")),
-        ('gains: {d: 1.0}', ('undeclared-parameter', "did you mean 'gains.p'?")),
         ('rate: {type: integer, default: a}', ('bad-parameter', None)),
     ],
 )

@@ -23,10 +23,8 @@ SHIPPED = list_systems(Path(composer.__file__).parents[1] / 'configs')
 CASES = sorted(path.stem for path in INVALID.glob('*.yaml'))
 # These look into interface packages, which come with ROS.
 NEED_INTERFACES = {
-    'field-range',
     'field-type',
     'many_findings',
-    'unknown-field',
     'unknown-type',
 }
 
@@ -64,12 +62,6 @@ def test_everything_that_is_wrong_is_said_in_one_run(case, monkeypatch):
 def test_a_case_shows_the_rule_that_it_is_named_after(case):
     text = (INVALID / f'{case}.txt').read_text()
     assert re.search(rf': (error|warning)\[{case}\]: ', text)
-
-
-def test_many_different_findings_are_found_at_once():
-    text = (INVALID / 'many_findings.txt').read_text()
-    assert len(set(re.findall(r'error\[([\w-]+)\]', text))) >= 10
-    assert len(re.findall(r'error\[', text)) >= 15
 
 
 @pytest.mark.parametrize('path', [*sorted((DATA / 'valid').rglob('*.yaml')), *SHIPPED], ids=str)

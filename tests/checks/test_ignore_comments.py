@@ -83,10 +83,6 @@ def test_what_stops_a_start_cannot_be_silenced(check):
     assert found[1][3] == "'bad-value' cannot be silenced: nothing can run until it is fixed"
 
 
-def test_a_comment_in_a_text_is_none(check):
-    assert check('    state: {note: "see # composer: ignore[bad-name]"}\n') == []
-
-
 def test_what_only_an_import_may_show_is_no_unused_comment_without_it(check):
     text = '    on_start: driving:start  # composer: ignore[bad-signature]\n'
     assert check(text) == []
@@ -102,18 +98,6 @@ def test_what_only_interfaces_show_is_no_unused_comment_without_them(check):
         '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
     )
     assert check(text, catalogue=InterfaceCatalogue(prefixes=[])) == []
-
-
-@pytest.mark.ros
-def test_a_comment_about_a_type_that_is_there_is_unused(check):
-    text = (
-        '    service_clients:\n'
-        '      switch: std_srvs/srv/SetBool  '
-        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
-        '      other: std_srvs/srv/SetBol  '
-        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
-    )
-    assert [finding[1:3] for finding in check(text)] == [('unused-ignore', 5)]
 
 
 def test_while_findings_hide_others_no_comment_is_called_unused(check):

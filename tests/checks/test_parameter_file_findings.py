@@ -254,12 +254,8 @@ def test_a_value_that_never_counts_is_a_warning(check):
     ('upper', 'lower', 'is_lost'),
     [
         ('/*/arm', '/**', True),
-        ('/robot/*', '/*/*', True),
-        ('/**/arm', '/**', True),
         ('/**', '/*/*', False),
-        ('/**/arm', '/*/arm', False),
         ('/*/arm', '/robot/*', False),
-        ('/robot/*', '/robot/arm', False),
     ],
 )
 def test_a_wider_name_below_takes_what_stands_above(check, upper, lower, is_lost):
@@ -310,15 +306,11 @@ def test_a_file_of_a_program_is_read_and_nothing_is_known_of_its_nodes(check):
     ('keys', 'values', 'pattern', 'is_lost'),
     [
         ('name: lidar, ', 'port: a', 'lidar', True),
-        ('name: lidar, ', 'port: a', '/**', True),
         ('', 'port: a', '/**', True),
-        ('', 'port: a', 'lidar', False),
         ('nodes: [lidar], ', 'port: a', 'lidar', True),
         ('nodes: [lidar, other], ', 'port: a', 'lidar', False),
-        ('name: lidar, ', 'port: {type: string, default: a}', '/*', True),
         ('name: lidar, ', 'port: b', 'lidar', False),
         # Of one name of nodes, integers come before texts.
-        ('name: lidar, ', 'port: 1', '/**', False),
         ('name: lidar, ', 'port: 1', '/*', True),
     ],
 )
@@ -343,7 +335,7 @@ def test_a_parameter_of_a_program_that_its_file_overrides_is_a_warning(
 
 @pytest.mark.parametrize(
     ('pattern', 'is_error'),
-    [('/**', True), ('lidar', True), ('/other', True), ('/arm', False)],
+    [('/**', True), ('/arm', False)],
 )
 def test_an_empty_list_is_for_nodes_of_the_system_alone(check, pattern, is_error):
     more = """
@@ -373,16 +365,6 @@ def test_the_name_of_a_programs_node_is_matched(check):
 def test_a_comment_in_the_parameter_file_silences_a_warning(check):
     text = '/**:\n  ros__parameters:\n    sped: 1.0  # composer: ignore[undeclared-parameter]\n'
     assert check(ARM, p=text) == []
-
-
-def test_a_file_named_by_an_argument_without_a_default_is_not_missed(check):
-    nodes = ARM.replace('[p.yaml]', '["{{ site }}.yaml"]')
-    assert check(nodes, before='args: {site: {type: string}}\n') == []
-
-
-def test_a_misspelt_file_comes_with_the_nearest(check):
-    (line,) = check(ARM, pp='/**: {ros__parameters: {speed: 1.0}}')
-    assert line.endswith("No such file or directory → did you mean 'pp.yaml'?")
 
 
 @pytest.mark.parametrize(

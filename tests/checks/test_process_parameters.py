@@ -29,19 +29,10 @@ def findings(parameters):
             'f: [1, a]',
             "parameter 'f': item 1: a list has one type, and this is a string, not an integer",
         ),
-        (
-            'f: [true, 2.5, x]',
-            "parameter 'f': item 1: a list has one type, and this is a double, not a bool",
-        ),
         ('f: null', "parameter 'f': there is no value, and ROS has no null"),
-        ('f: [1.0, null]', "parameter 'f': item 1: there is no value, and ROS has no null"),
         ('f: [[1]]', "parameter 'f': item 0: a list of parameters cannot contain lists"),
         ('f: [{a: 1}]', "parameter 'f': item 0: a list of parameters cannot contain mappings"),
         ('f: 9223372036854775808', "parameter 'f': 9223372036854775808 does not fit in 64 bits"),
-        (
-            'f: [0, -9223372036854775809]',
-            "parameter 'f': -9223372036854775809 does not fit in 64 bits",
-        ),
         (
             'f: {g: {}}',
             "parameter 'f.g': the mapping is empty, and ROS misreads what follows one",

@@ -35,8 +35,7 @@ def find(check, rule, body, count=3):
 )
 def test_a_finding_of_all_instances_is_one(check, rule, body, message):
     assert find(check, rule, body, 1) == [message]
-    assert find(check, rule, body, 2) == [f'{message} (and the same for 1 more instance)']
-    assert find(check, rule, body, 300) == [f'{message} (and the same for 299 more instances)']
+    assert find(check, rule, body, 40) == [f'{message} (and the same for 39 more instances)']
 
 
 def test_what_differs_otherwise_stays(check):

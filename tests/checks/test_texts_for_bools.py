@@ -61,20 +61,15 @@ def test_a_word_without_quotes_is_found_and_a_text_is_not(find, section):
     ('section', 'entry', 'found'),
     [
         ('argument', 'x: {default: no}', [(TEXT, 'no', EITHER)]),
-        ('argument', 'x: {default: no, type: string}', []),
         ('argument', 'x: {default: on, choices: [on, off]}', []),
         ('argument', 'x: {default: no, type: bool}', [('bad-argument-declaration', 'no', FALSE)]),
         ('include', 'flag: no', [('argument-type', 'no', FALSE)]),
-        ('include', 'word: no', []),
         ('node', 'x: {default: no}', [(TEXT, 'no', EITHER)]),
         ('node', 'x: {default: no, type: string}', []),
-        ('node', 'x: {default: on, choices: [on, off]}', []),
         ('node', 'x: {default: no, type: bool}', [('bad-parameter', 'no', FALSE)]),
-        ('node', 'x: {default: [no], type: bool_array}', [('bad-parameter', 'no', FALSE)]),
         ('node', 'x: [no, no]', [(TEXT, 'no', EITHER)] * 2),
         ('node', 'axes: [x, y, z]', []),
         ('process', 'x: {y: {z: no}}', [(TEXT, 'no', EITHER)]),
-        ('process', 'axes: [x, y]', []),
     ],
 )
 def test_what_is_declared_a_text_is_one(find, section, entry, found):

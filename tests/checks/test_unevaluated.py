@@ -26,13 +26,10 @@ def find(text):
     [
         (COMMAND % 'echo, $(env HOME)/x', '$(env HOME)', HOME),
         ('args: {a: "x/$(var b)"}', '$(var b)', 'write {{ b }}'),
-        ('nodes: {n: {parameters: {a: {b: "$(find-pkg-share c)"}}}}', '$(find-pkg-share c)', ''),
         ('nodes: {n: {remap: {a: $(var b)/c}}}', '$(var b)', 'write {{ b }}'),
         (COMMAND % 'echo, $HOME/x', '$HOME', HOME),
-        (COMMAND % "echo, '--out=${HOME}'", '${HOME}', HOME),
         (COMMAND % 'echo, bag_$USER', '$USER', "write {{ env('USER') }}"),
         (COMMAND % 'echo, ~/x', '~', HOME),
-        (COMMAND % 'echo, --out=~/x', '~', HOME),
         ('environment: {PATH: /a:$PATH}', '$PATH', "write {{ env('PATH') }}"),
         ('processes: {p: {command: [echo], env: {A: $HOME}}}', '$HOME', HOME),
         *((COMMAND % f"echo, '{sign}', b", sign, SHELL) for sign in ('|', '&&', '>>', '2>&1')),

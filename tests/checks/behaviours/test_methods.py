@@ -60,7 +60,6 @@ def system(entity):
     [
         ('', {}, []),
         ("t: {rate: 1, behaviour: 'parts:Talker.count', publish: words}", {}, ['field-type']),
-        ("t: {rate: 1, behaviour: 'parts:Talker.stand'}", {}, []),
         ('', {'name': 'wrods'}, ['unknown-publisher']),
         ('', {'payload': '5'}, ['field-type']),
         ("s: {type: std_msgs/msg/String, external: true, behaviour: 'parts:Talker.hear'}", {}, []),
@@ -69,16 +68,9 @@ def system(entity):
             {'field': 'date'},
             ['unknown-field'],
         ),
-        (
-            "s: {type: std_msgs/msg/String, external: true, behaviour: 'parts:Talker.steps'}",
-            {},
-            ['generator-not-allowed'],
-        ),
         ("t: {rate: 1, behaviour: 'parts:Talker.talk', with: {luod: true}}", {}, ['bad-argument']),
         ("t: {rate: 1, behaviour: 'parts:Talker.hear'}", {}, ['bad-signature']),
-        ("t: {rate: 1, behaviour: 'parts:Odd.tick'}", {}, ['bad-signature']),
         ("t: {rate: 1, behaviour: 'parts:Talker.tlak'}", {}, ['unknown-behaviour']),
-        ("t: {rate: 1, behaviour: 'parts:Taker.talk'}", {}, ['unknown-behaviour']),
         ("t: {rate: 1, behaviour: 'parts:plain.talk'}", {}, ['unknown-behaviour']),
     ],
 )

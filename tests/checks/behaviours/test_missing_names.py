@@ -19,34 +19,22 @@ def go(node): ...
 # What is wrong, the rule, and the suggestion.
 WRONG = [
     ('X = math.sqr(2.0)', 'unknown-attribute', 'sqrt'),
-    ('X = math.PI', 'unknown-attribute', 'pi'),
-    ('def later(x=math.clamp): ...', 'unknown-attribute', ''),
     ('class Late:\n    def run(self): return time.now()', 'unknown-attribute', ''),
-    ('X = os.path.exist("x")', 'unknown-attribute', 'exists'),
-    ('X = it.chains([1])', 'unknown-attribute', 'chain'),
     ('X = collections.dequeue()', 'unknown-attribute', 'deque'),
     ('X = datetime.datetime.noww()', 'unknown-attribute', 'now'),
-    ('X = json.parse', 'unknown-attribute', ''),
     ('X = rclpy.time.Tim', 'unknown-attribute', 'Time'),
     ('X = composer.CallTimedOutError', 'unknown-attribute', 'CallTimeoutError'),
     ('from composer import Nod', 'missing-module', 'Node'),
-    ('from time import sleeep', 'missing-module', 'sleep'),
     ('from rclpy.time import Duraton', 'missing-module', 'Duration'),
     ('from sensor_msgs import Image', 'missing-module', 'sensor_msgs.msg'),
-    ('from std_srvs import SetBool as S', 'missing-module', 'std_srvs.srv'),
     ('X = sensor_msgs.Image()', 'missing-module', 'sensor_msgs.msg'),
-    ('X = sensor_msgs.msg.Imag()', 'missing-module', 'Image'),
     ('def later():\n    from std_srvs.msg import Trigger', 'missing-module', 'std_srvs.srv.Trigger'),
     ('X = {1: DiagnosticStatus.EROR}', 'unknown-field', 'ERROR'),
-    ('class Config:\n    level = DiagnosticStatus.WARNING', 'unknown-field', 'WARN'),
     ('@dataclass\nclass C:\n    fix: int = NavSatStatus.STATUS_FIXED', 'unknown-field', 'STATUS_FIX'),
-    ('def later(fix=NavSatFix.STATUS_FIX): ...', 'unknown-field', ''),
     ('X = DiagnosticStatus.Ok', 'unknown-field', 'OK'),
 ]  # fmt: skip
 RIGHT = [
     'X = math.sqrt(2.0), os.path.join("a"), os.sep, datetime.datetime.now, DiagnosticStatus.OK',
-    'X = DiagnosticStatus.name, DiagnosticStatus.get_fields_and_field_types, SetBool.Request',
-    'X = SetBool.Request.data, sensor_msgs.msg.Image, rclpy.time.Time, rclpy.clock, sys.__name__',
     'X = math.sumprod if hasattr(math, "sumprod") else None',
     'if sys.version_info > (3, 12):\n    X = it.batched',
     'X = sys.platform == "win32" and os.startfile',
@@ -54,9 +42,7 @@ RIGHT = [
     'try:\n    from time import never\nexcept ImportError: ...',
     'math.extra = 1\nX = math.extra',
     'def later(math): return math.extra',
-    'def later(m):\n    for time in m: print(time.extra)',
     'import json as math\nX = math.sqr',
-    'X = composer.up, composer.check, composer.errors',
 ]
 
 

@@ -54,16 +54,11 @@ TYPES = {
 }
 WRITES = [
     'scan: scan.range_max = 2.0',
-    'scan: scan.range_max += 2.0',
     'scan: scan.header.stamp.sec = 2',
     'scan: scan.ranges[0] = 2.0',
-    'scan: scan.ranges[0] *= 2',
-    'scan: scan.ranges += scan.ranges',
     'scan: scan.ranges.append(2.0)',
-    'scan: del scan.ranges[0]',
     'scan: ranges = scan.ranges; ranges.extend([1.0])',
     'scan: header = scan.header if scan.ranges else scan.header; header.frame_id = "map"',
-    'scan: a, b = scan, scan.header; b.frame_id = "map"',
     'scan: stamp(node, scan)',
     'scan: Keeper(scan).stamp(node)',
     """scan:
@@ -80,58 +75,37 @@ WRITES = [
             pass""",
     'poses: poses.poses[0].position.x = 1.0',
     'poses: poses.poses.sort(key=str)',
-    'poses: poses.poses.insert(0, Pose())',
     """poses:
         for pose in poses.poses:
             pose.position.x += 1.0""",
     'camera: camera.k[0] = 1.0',
-    'camera: camera.k *= 2',
     'camera: camera.k.flat[0] = 1.0',
-    'camera: camera.k.T[0] = 1.0',
     'camera: camera.k.fill(0.0)',
 ]
 READS = [
     'scan: return scan',
     'scan: node.publish("out", scan)',
     'scan: other = copy.deepcopy(scan); other.range_max = 2.0; return other',
-    'scan: other = copy.copy(scan); other.range_max = 2.0; return other',
     'scan: scan = copy.deepcopy(scan); scan.header.stamp = node.now().to_msg(); return scan',
     'scan: other = LaserScan(header=scan.header, ranges=scan.ranges); other.range_max = 2.0',
     'scan: return stamp(node, copy.deepcopy(scan))',
     'scan: scan = LaserScan(); scan.range_max = 2.0',
     'scan: limit = scan.range_max; limit += 2.0',
-    'scan: ranges = scan.ranges[:]; ranges[0] = 1.0',
-    'scan: ranges = scan.ranges.tolist(); ranges.append(1.0)',
-    'scan: ranges = list(scan.ranges); ranges[0] = 1.0; ranges.sort()',
     'scan: ranges = copy.copy(scan.ranges); ranges.append(1.0)',
-    'scan: ranges = sorted(scan.ranges); ranges.pop()',
     'scan: ranges = scan.ranges + scan.ranges; ranges[0] = 1.0',
     'scan: values = np.array(scan.ranges); values *= 2',
-    'scan: values = np.asarray(scan.ranges).copy(); values *= 2',
-    'scan: values = np.asarray(scan.ranges) * 2; values[0] = 1.0',
-    'scan: values = np.asarray(scan.ranges).astype(np.float64); values[0] = 1.0',
     'scan: value = np.asarray(scan.ranges)[0]; value += 1',
-    'scan: values = np.asarray(scan.ranges); largest = values.max(); largest += 1',
-    'scan: values = np.clip(np.asarray(scan.ranges), 0, 1); values[0] = 1.0',
     'scan: scan.ranges.index(1.0); scan.ranges.count(1.0); scan.header.frame_id.upper()',
-    'scan: frame = scan.header.frame_id; frame += "_link"',
     'scan: header = copy.deepcopy(scan.header); header.frame_id = "map"',
-    'scan: header = Header(stamp=scan.header.stamp); header.frame_id = "map"',
     'scan: node.state.last = scan; node.state.last = None',
     'scan: node.state.ranges = [*scan.ranges]; node.state.ranges.append(1.0)',
-    'scan: found = {}; found[scan.header.frame_id] = scan',
-    'scan: found = []; found.append(scan); found += [scan]',
     'scan: other = Keeper(copy.deepcopy(scan)); other.stamp(node)',
-    'scan: random.shuffle(list(scan.ranges)); heapq.heapify([*scan.ranges])',
     """scan:
         if scan.range_max > 2.0:
             scan = copy.deepcopy(scan)
         if scan.range_max > 2.0:
             scan.range_max = 2.0""",
-    'poses: other = PoseArray(poses=poses.poses[:1]); other.poses.append(Pose())',
-    'poses: found = poses.poses.copy(); found.append(Pose())',
     'poses: found = [copy.deepcopy(pose) for pose in poses.poses]; found[0].position.x = 1.0',
-    'poses: found = copy.deepcopy(list(poses.poses)); found[0].position.x = 1.0',
     """poses:
         found = []
         for pose in poses.poses:
@@ -139,7 +113,6 @@ READS = [
             moved.position.x = pose.position.x + 1.0
             found.append(moved)
         found.reverse()""",
-    'poses: x = poses.poses[0].position.x; x += 1.0',
     'camera: matrix = camera.k.copy(); matrix[0] = 1.0',
     'camera: matrix = camera.k * 2; matrix[0] = 1.0; matrix *= 2',
     'camera: matrix = camera.k.reshape(3, 3).copy(); matrix[0, 0] = 1.0',

@@ -106,20 +106,12 @@ def test_what_ros_itself_serves_needs_no_other_end(check):
     ('section', 'name', 'right'),
     [
         ('publishers', '/rosout', 'rcl_interfaces/msg/Log'),
-        ('publishers', '/clock', 'rosgraph_msgs/msg/Clock'),
         ('publishers', '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'),
-        ('subscriptions', '/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray'),
         ('subscriptions', '/elsewhere/_action/status', 'action_msgs/msg/GoalStatusArray'),
         ('subscriptions', '/act/_action/feedback', None),
-        ('subscriptions', '/elsewhere/_action/feedback', 'any/msg/Type'),
         ('service_clients', '/act/_action/cancel_goal', 'action_msgs/srv/CancelGoal'),
-        ('service_clients', '/act/_action/send_goal', None),
         ('service_clients', '~/get_parameters', 'rcl_interfaces/srv/GetParameters'),
-        ('service_clients', '/b/list_parameters', 'rcl_interfaces/srv/ListParameters'),
-        ('service_clients', '/c/list_parameters', 'any/srv/Type'),
-        ('service_clients', '/c/get_logger_levels', 'rcl_interfaces/srv/GetLoggerLevels'),
         ('service_clients', '/c/change_state', 'lifecycle_msgs/srv/ChangeState'),
-        ('service_clients', '/b/change_state', 'any/srv/Type'),
     ],
 )
 def test_what_ros_has_itself_has_the_types_of_ros(check, section, name, right):
@@ -182,16 +174,11 @@ DEADLINE = """
     ('old', 'new'),
     [
         ('deadline: 0.5', 'deadline: 1.5'),
-        ('deadline: 0.5', 'deadline: 0'),
         ('deadline: 0.5', 'deadline: infinite'),
-        ('{deadline: 0.5}', 'best_available'),
-        ('period: 1', 'period: 0.25'),
         ('period: 1', 'rate: 2'),
         ('period: 1', 'period: "{{ period }}"'),
-        ('deadline: 0.5', 'deadline: "{{ period }}"'),
         ('period: 1', 'clock: ros, period: 1'),
         ('timers:', 'timers:\n      two: {period: 0.8, publish: out, message: hello}'),
-        ('timers:', 'on_start: parts:publish\n    timers:'),
         ('timers:', 'on_start: parts:reach\n    timers:'),
         ('timers:', 'on_start: {behaviour: parts:choose, with: {name: out}}\n    timers:'),
         (
@@ -199,7 +186,6 @@ DEADLINE = """
             'subscriptions: {in: {type: std_msgs/msg/String, external: true, publish: out}}\n'
             '    timers:',
         ),
-        ('timers:', 'services: {bad}\n    timers:'),
     ],
 )
 def test_a_deadline_is_kept_where_something_may_publish_in_time(check, old, new):
@@ -238,15 +224,8 @@ def test_a_deadline_is_compared_with_all_timers_of_a_publisher(check):
     [
         ('{on: false}', '  a: {when: "{{ on }}"}\n  b: {when: false}', False),
         ('{on: true}', '  a: {when: "{{ on }}"}\n  b: {when: false}', True),
-        ('{on: {type: bool}}', '  a: {when: false}', True),
         ('{on: false}', '  a: {when: "{{ on }}"}\nprocesses: {p: {command: [sh]}}', True),
-        (
-            '{on: false}',
-            '  a: {when: "{{ on }}"}\nprocesses: {p: {command: [sh], when: false}}',
-            False,
-        ),
         ('{on: false}', '  a: {when: "{{ on }}"}\n  b: {whne: true}', True),
-        ('{on: false}', '  a: {when: "{{ on }}"}\n  b: 3', True),
         ('{on: false}', '  a: {foreach: {i: []}}', True),
     ],
 )
@@ -325,14 +304,6 @@ def test_the_odd_one_out_has_the_wrong_type(check):
     ]
 
 
-def test_a_type_that_is_not_known_yet_is_no_conflict(check):
-    nodes = meeting('', 'remap: {heard: chatter}')
-    for wrong in ('type: String', 'type: "{{ kind }}"'):
-        before = 'args: {kind: {type: string}}\n'
-        found = check(nodes.replace('type: std_msgs/msg/String', wrong, 1), CODE, before=before)
-        assert 'conflicting-types' not in [rule for _, rule in found]
-
-
 def test_one_finding_stands_for_all_ends_of_the_same_qos(check):
     names = [f's{index}' for index in range(5)]
     inputs = '\n'.join(
@@ -357,13 +328,6 @@ def test_qos_that_is_not_known_is_compatible(check):
         assert 'incompatible-qos' not in [rule for _, rule in check(text, CODE)]
     text = nodes.replace('topic: chatter', 'topic: chatter, qos: {reliability: "{{ how }}"}')
     assert check(text, CODE, before='args: {how: {type: string}}\n') == []
-
-
-def test_qos_that_the_command_line_decides_is_compatible(check):
-    nodes = meeting('', 'remap: {heard: chatter}')
-    nodes = nodes.replace('topic: chatter', 'topic: chatter, qos: {deadline: "{{ limit }}"}')
-    nodes = nodes.replace('topic: heard', 'topic: heard, qos: {deadline: 0.001}')
-    assert check(nodes, CODE, before='args: {limit: {type: double}}\n') == []
 
 
 @pytest.mark.parametrize(
@@ -394,17 +358,12 @@ LOOP = """
     ('body', 'is_loop'),
     [
         ('return message', True),
-        ('return message.data + 1', True),
         ('return {"data": 1}', True),
-        ('return Int32(data=1)', True),
         ('return 1 if message.data else None', False),
         ('if message.data: return 1', False),
         ('if message.data:\n    return 1\nelse:\n    return -message.data', True),
-        ('return', False),
         ('pass', False),
-        ('message = find(); return message', False),
         ('return find(message)', False),
-        ('raise ValueError', False),
         ('return 1\nyield', False),
     ],
 )
@@ -423,17 +382,6 @@ def test_a_chain_of_relays_is_no_loop(check):
       b: {type: std_msgs/msg/String, publish: c}
 """
     assert check(nodes) == []
-
-
-def test_a_name_is_measured_in_full_where_a_rule_leads_to(check):
-    long = 'b' * 240
-    nodes = f"""
-  a:
-    namespace: /robot_one
-    remap: {{chatter: {long}}}
-"""
-    (message,) = check(nodes, rule='bad-name')
-    assert message.endswith('and a topic name has at most 247 characters')
 
 
 @pytest.mark.parametrize(('length', 'is_right'), [(226, True), (227, False)])

@@ -19,7 +19,6 @@ NODES = """\
     [
         ('pass', [(7, 'no-publisher'), (8, 'no-subscription')]),
         ("node.create_publisher(String, 'words')", [(8, 'no-subscription')]),
-        ("node.create_publisher('std_msgs/msg/String', '/words')", [(8, 'no-subscription')]),
         ("node.create_subscription(String, 'replies', hear)", [(7, 'no-publisher')]),
         (
             'node.create_publisher(String, node.parameters.source, name="out")\n'
@@ -29,10 +28,6 @@ NODES = """\
         (
             'for i in range(3):\n        node.create_publisher(String, compute(i))',
             [(8, 'no-subscription')],
-        ),
-        (
-            'node.create_publisher(Int32, compute(1))',
-            [(7, 'no-publisher'), (8, 'no-subscription')],
         ),
         (
             "node.create_publisher('words')",

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.checks.connections.cycles import find_cycles, find_knots, find_way
@@ -21,6 +21,7 @@ def reachable(edges, start):
     return found
 
 
+@settings(max_examples=40)
 @given(GRAPHS)
 def test_knots_are_the_sets_of_nodes_that_reach_each_other(edges):
     reach = {node: reachable(edges, node) for node in NODES}
@@ -32,6 +33,7 @@ def test_knots_are_the_sets_of_nodes_that_reach_each_other(edges):
     assert {frozenset(knot) for knot in find_knots(edges)} == knots
 
 
+@settings(max_examples=40)
 @given(GRAPHS)
 def test_each_knot_has_a_cycle_of_edges(edges):
     cycles = list(find_cycles(edges))
@@ -41,6 +43,7 @@ def test_each_knot_has_a_cycle_of_edges(edges):
             assert after in edges[node]
 
 
+@settings(max_examples=40)
 @given(GRAPHS)
 def test_a_way_is_found_if_there_is_one(edges):
     way = find_way(edges, 0, {1}, NODES)
@@ -51,7 +54,7 @@ def test_a_way_is_found_if_there_is_one(edges):
 
 
 def test_a_long_chain_needs_no_recursion():
-    edges = {node: [node + 1] for node in range(50_000)}
+    edges = {node: [node + 1] for node in range(20_000)}
     assert find_knots(edges) == []
-    edges[50_000] = [0]
-    assert len(next(find_cycles(edges))) == 50_001
+    edges[20_000] = [0]
+    assert len(next(find_cycles(edges))) == 20_001

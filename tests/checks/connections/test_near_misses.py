@@ -76,7 +76,7 @@ def check(publishers, subscriptions, clients=(), servers=()):
     return [each for each in findings if each.rule in rules]
 
 
-@pytest.mark.parametrize('seed', range(30))
+@pytest.mark.parametrize('seed', range(10))
 def test_right_names_are_never_doubted(seed):
     """Each end is elsewhere, or with ours, as it comes."""
     chance = random.Random(seed)
@@ -96,12 +96,6 @@ SLIPS = [
     *(('cmd_vel', 'cmd_val'), ('cmd_vel', 'Cmd_vel'), ('scan', 'scann'), ('scan', 'sacn')),
     *(('odom', 'odm'), ('odom', 'odem'), ('map', 'mao'), ('imu/data', 'imu/date')),
     *(('imu/data_raw', 'imu/data_rwa'), ('joint_states', 'joint_state'), ('plan', 'plann')),
-    *(('joint_states', 'jiont_states'), ('joint_states', 'jointstates'), ('imu', 'imuu')),
-    *(('goal_pose', 'goal_psoe'), ('goal_pose', 'gaol_pose'), ('initialpose', 'initial_pose')),
-    *(('initialpose', 'intialpose'), ('initialpose', 'inititalpos'), ('speech', 'speach')),
-    *(('odometry/filtered', 'odometry/fitlerd'), ('odometry/filtered', 'odometery/filtered')),
-    *(('left/image_raw', 'lefft/image_raw'), ('left/image_raw', 'left/image_row')),
-    *(('camera/color/camera_info', 'camera/color/camera_inf'), ('estop', 'e_stop')),
     *(('camera/color/camera_info', 'camera/colour/camera_info'), ('enable', 'enabel')),
     *(('velocity_controller/commands', 'velocity_controler/commands'), ('is_docked', 'is_doked')),
 ]

@@ -33,15 +33,11 @@ def test_a_slip_is_found(word, option):
     ('word', 'option'),
     [
         ('/camera_1', '/camera_2'),
-        ('/camera1', '/camera2'),
         ('/arm_l', '/arm_r'),
         ('/map', '/mop'),
-        ('/arm_lr', '/arm_rl'),
         ('/cmd_vell', '/cmd_vel'),
-        ('/left/scan', '/right/scan'),
         ('/scan', '/left/scan'),
         ('/lfet/camrea', '/left/camera'),
-        ('/trjetcori', '/trajectory'),
     ],
 )
 def test_another_name_is_no_typo(word, option):

@@ -19,16 +19,11 @@ PATH = 'expected a {}: a path of letters, digits and _ . + - /; got {!r}'
 WRONG = {
     'robot@10.0.0.1': "the user has a key of its own, 'user:'",
     '10.0.0.2:2222': "the port has a key of its own, 'port:'",
-    'robot.local:22': "the port has a key of its own, 'port:'",
     '[2001:db8::2]': "write it without brackets; its port goes into 'port:'",
     '10.0.0.2/24': 'leave out the slash and what comes after it',
     '-oProxyCommand=x': 'programs would take it for an option',
-    '-h': 'programs would take it for an option',
     '999.1.1.1': 'a name has letters, digits, dashes, underscores and dots',
-    '10.0.0': 'a name has letters, digits, dashes, underscores and dots',
     'a b': 'a name has letters, digits, dashes, underscores and dots',
-    'a;b': 'a name has letters, digits, dashes, underscores and dots',
-    'a..b': 'a name has letters, digits, dashes, underscores and dots',
     '$(x)': 'a name has letters, digits, dashes, underscores and dots',
 }
 RIGHT = ['10.0.0.1', 'fe80::1', 'fe80::1%eth0', '::1', 'robot-1.local', 'jet_son', 'pi.2', 'x.']
@@ -86,28 +81,20 @@ def test_a_path_is_one_word_for_a_shell(find, key, value, is_right):
     ('text', 'rules'),
     [
         ('hosts: {h: {address: localhost}, g: {address: 127.0.1.1}}', ['duplicate-host']),
-        ('hosts: {h: {address: "::1"}, g: {address: 127.0.0.1}}', ['duplicate-host']),
         (
             'hosts: {h: {address: "2001:db8::1"}, g: {address: "2001:DB8:0::1"}}',
             ['duplicate-host'],
         ),
-        ('hosts: {h: {address: localhost, port: 2222}, g: {address: localhost}}', []),
         ('hosts: {h: {systemd: system}}', ['needs-root']),
         ('hosts: {h: {systemd: system, user: robot}}', ['needs-root']),
         ('hosts: {h: {user: "root;id"}}', ['bad-value']),
-        ('hosts: {h: {user: "-oProxyCommand=id"}}', ['bad-value']),
-        ('hosts: {h: {user: "$(id)"}}', ['bad-value']),
-        ('hosts: {h: {user: "a b"}}', ['bad-value']),
         ('hosts: {h: {user: "j.doe@example.org"}}', []),
         ('hosts: {h: {systemd: system, user: root}}', []),
-        ('hosts: {h: {systemd: user, user: robot}}', []),
         ('hosts: {h: {}}\nnetwork: {port: 3}', ['ignored-network-key']),
-        ('hosts: {h: {}}\nnetwork: {server: h, discovery: peers}', ['ignored-network-key']),
         (
             'hosts: {h: {}}\nnetwork: {server: h, discovery: zenoh, peers: [x], port: 3}',
             ['ignored-network-key'],
         ),
-        ('hosts: {h: {}}\nnetwork: {server: h, discovery: discovery_server, port: 3}', []),
         ('hosts: {h: {}}\nnetwork: {peers: [x]}', []),
     ],
 )
