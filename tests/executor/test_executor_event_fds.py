@@ -1,11 +1,9 @@
 """Few descriptors for any number of entities; the busy ones have their own."""
 
 import errno
-import gc
 import os
 import resource
 import weakref
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,7 @@ from spinning import DEADLINE_SEC, spinning, wait_for
 from std_msgs.msg import Empty
 
 from composer.executor import event_fds
-from composer.executor.descriptors import ExecutorError, write_eventfd
+from composer.executor.descriptors import write_eventfd
 from composer.executor.event_poller import EventPoller
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -185,38 +183,6 @@ def test_a_node_that_was_added_without_descriptors_is_served_when_there_are_some
         publisher.publish(Empty())
         wait_for(lambda: heard)
     assert not errors
-
-
-@pytest.mark.parametrize('spare', range(3))
-def test_a_poller_that_cannot_be_made_leaves_nothing_behind(spare):
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
-    taken: list[int] = []
-    try:
-        with suppress(OSError):
-            while True:
-                taken.append(os.open(os.devnull, os.O_RDONLY))
-        for _ in range(spare):
-            os.close(taken.pop())
-        with pytest.raises((OSError, ExecutorError), match=r'open files|timerfd'):
-            EventPoller()
-        gc.collect()
-        taken.extend(os.open(os.devnull, os.O_RDONLY) for _ in range(spare))
-    finally:
-        for fd in taken:
-            os.close(fd)
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-
-
-def test_an_event_of_a_listener_that_has_just_gone_is_skipped(poller):
-    heard: list[str] = []
-    (listener,) = attach(poller, heard, 'a')
-    listener.write()
-    arrived = poller._epoll.poll(5.0)
-    assert arrived
-    poller.event_fds.detach(listener)
-    poller._dispatch(arrived)
-    assert heard == []
 
 
 def test_of_several_events_the_least_rank_comes_first(poller):

@@ -28,13 +28,6 @@ def test_the_interval_is_short_until_the_last_user_has_left():
     assert sys.getswitchinterval() == 0.005
 
 
-def test_a_shorter_interval_is_not_changed():
-    sys.setswitchinterval(0.0005)
-    with ShortSwitchInterval():
-        assert sys.getswitchinterval() == 0.0005
-    assert sys.getswitchinterval() == 0.0005
-
-
 def test_an_interval_that_was_set_meanwhile_is_not_changed():
     interval = ShortSwitchInterval()
     with interval:

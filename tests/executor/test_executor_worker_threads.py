@@ -1,7 +1,6 @@
 """The executor's threads and their end."""
 
 import _thread
-import ctypes
 import threading
 import time
 
@@ -60,43 +59,6 @@ def test_shutdown_keeps_what_a_waiting_spin_once_waits_with(node, executor):
     assert errors == []
 
 
-class Thrown(Exception):  # noqa: N818
-    """What a behaviour throws into threads."""
-
-
-def test_the_executor_can_be_spun_on_when_its_waiting_threads_are_thrown_into(node, executor):
-    ticks = []
-    node.create_timer(0.05, lambda: ticks.append(1))
-    thrown = []
-
-    def spin():
-        while not executor._is_shutdown:
-            try:
-                executor.spin()
-            except Thrown as error:
-                thrown.append(error)
-
-    thread = threading.Thread(target=spin)
-    thread.start()
-    for _ in range(10):
-        before = len(ticks)
-        # While one sleeps, others take over; what is thrown reaches them where they wait, because
-        # between two steps of the executor itself nothing can be promised.
-        executor.create_task(time.sleep, 0.1)
-        wait_for(lambda before=before: len(ticks) > before + 2)
-        time.sleep(0.01)
-        for ident in list(executor._spinner.workers._workers):
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(ident), ctypes.py_object(Thrown)
-            )
-    before = len(ticks)
-    wait_for(lambda: len(ticks) > before + 2)
-    executor.shutdown()
-    thread.join(DEADLINE_SEC)
-    assert not thread.is_alive()
-    assert thrown
-
-
 def test_one_thread_is_enough_where_there_are_no_more(node, executor, monkeypatch):
     ticks = []
     node.create_timer(0.001, lambda: ticks.append(time.sleep(0.002)))
@@ -131,19 +93,4 @@ def test_callbacks_are_traced_as_in_other_threads(node, executor, monkeypatch):
     with spinning(executor) as errors:
         wait_for(timer.is_canceled)
     assert 'tick' in traced
-    assert errors == []
-
-
-def test_a_tracer_that_raises_ends_no_thread(node, executor, monkeypatch):
-    def fail(*_):
-        raise Thrown
-
-    ran = []
-    with spinning(executor) as errors:
-        wait_for(executor._spinner.workers.has_threads)
-        monkeypatch.setattr(threading, '_trace_hook', fail)
-        monkeypatch.setattr(threading, '_profile_hook', fail)
-        for _ in range(10):
-            executor.create_task(lambda: ran.append(time.sleep(0.1)))
-        wait_for(lambda: len(ran) == 10)
     assert errors == []

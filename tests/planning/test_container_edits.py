@@ -1,9 +1,8 @@
 """What an edit of containers and their components does."""
 
-import subprocess
-import sys
-
 import pytest
+
+from composer.cli.main import run
 
 SYSTEM = """\
 version: 1
@@ -55,17 +54,11 @@ EDITS = {
 
 
 @pytest.mark.parametrize('name', EDITS)
-def test_an_edit_of_a_container_is_told(tmp_path, name):
+def test_an_edit_of_a_container_is_told(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
     old, new, told = EDITS[name]
     (tmp_path / 'values.yaml').write_text('/**: {ros__parameters: {size: 1}}')
     (tmp_path / 'system.yaml').write_text(SYSTEM)
     (tmp_path / 'edited.yaml').write_text(SYSTEM.replace(old, new))
-    done = subprocess.run(
-        [sys.executable, '-m', 'composer', 'plan', 'system.yaml', 'edited.yaml'],
-        check=False,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
-
-    assert done.stdout.splitlines()[:-1] == told, done.stderr
+    run(['plan', 'system.yaml', 'edited.yaml'])
+    assert capsys.readouterr().out.splitlines()[:-1] == told

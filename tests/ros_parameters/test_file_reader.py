@@ -91,23 +91,14 @@ def test_a_file_may_hold_nothing(text):
 
 FAULTS = {
     'a: 1': ("1:4 this value has no 'ros__parameters' above it"),
-    '- a': ("1:1 this value has no 'ros__parameters' above it"),
     'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is not a key of parameter files",
     'a:\n  ros__parameterss: {b: 1}': "2:3 ROS reads 'ros__parameterss' as 'ros__parameters'",
-    'ros__parameters: {b: 1}': "1:1 'ros__parameters' belongs below the name of a node",
     'a: {ros__parameters: 5}': "1:22 'ros__parameters' must be a mapping of parameters",
-    'a: {ros__parameters: }': "1:22 'ros__parameters' must be a mapping of parameters",
     'a: {ros__parameters: {b: }}': "1:26 'b' has no value",
     'a: {ros__parameters: {b: [1, ~]}}': (
         '1:30 all items of a list have one type: this is a string, the first is an integer'
     ),
-    'a: {ros__parameters: {b: [on, 1]}}': (
-        '1:31 all items of a list have one type: this is an integer, the first is a bool'
-    ),
     'a: {ros__parameters: {b: [[1]]}}': '1:27 a list of parameters cannot contain lists',
-    'a: {ros__parameters: {b: [{c: 1, d: 2}]}}': (
-        '1:27 a list of parameters cannot contain mappings'
-    ),
     'a: {ros__parameters: {b: {}}}': (
         "1:23 'b' is an empty mapping, and ROS misreads what follows it"
     ),
@@ -117,9 +108,6 @@ FAULTS = {
     'a: {ros__parameters: {b: {c.d: {e: 1}, f: 2}}}': (
         "1:27 ROS reads what follows 'c.d' as a part of it"
     ),
-    'a: {b/c: {ros__parameters: {d: 1}}, e: {ros__parameters: {d: 1}}}': (
-        "1:5 ROS puts the names after 'b/c' into another namespace"
-    ),
     'a: {ros__parameters: {b: 1, b: {c: 2}}}': ("1:23 'b' has both a value and names below it"),
     'a: {ros__parameters: {b: &x 1, c: *x}}': (
         '1:35 ROS does not support aliases here: write what *x stands for'
@@ -127,12 +115,7 @@ FAULTS = {
     'a-b: {ros__parameters: {c: 1}}': (
         "1:1 'a-b': a node name has only letters, digits and underscores"
     ),
-    '/ar*: {ros__parameters: {c: 1}}': (
-        "1:1 '/ar*': a node name has only letters, digits and underscores; "
-        "'*' and '**' must be alone between slashes"
-    ),
     'a: {ros__parameters: {"": 1}}': '1:23 a key must be a string, and this one is empty',
-    'a: {ros__parameters: {? [b] : 1}}': '1:25 a key must be a string, not a list or a mapping',
 }
 
 
@@ -165,20 +148,14 @@ PATTERNS = {
     '/**': True,
     '/*': False,
     '/*/*': True,
-    '/robot/*': True,
     '/robot/**': True,
     '/**/arm': True,
-    '/*/arm': True,
     'arm': False,
-    'robot/arm': True,
     '/robot/arm': True,
     '/robot/**/arm': True,
-    '/robot/*/arm': False,
     '/**/robot/**/arm/**': True,
     '**': True,
-    '*': False,
     '/robot/leg': False,
-    '/**/**': True,
     '/*/*/*': False,
 }
 
@@ -192,10 +169,6 @@ def test_wildcards_match_as_they_do_in_ros(pattern, matches):
 @pytest.mark.parametrize('pattern', ['/', '//', '/a//b', '/a/', '/a b', '/1a', '/a*/b', '/a/***'])
 def test_what_names_no_node_is_refused(pattern):
     assert find_pattern_problem(pattern) is not None
-
-
-def test_many_wildcards_are_matched_in_no_time():
-    assert matches_pattern('/**/*' * 500 + '/**', '/' + '/'.join('abcdefgh')) is False
 
 
 def test_later_files_win():

@@ -40,16 +40,6 @@ def test_messages_keep_their_order_and_none_is_lost(node: Any, executor: Any) ->
     assert got == list(range(3000))
 
 
-def test_messages_published_before_spin_arrive(node: Any, executor: Any) -> None:
-    got: list[int] = []
-    node.create_subscription(Int32, 'count', lambda m: got.append(m.data), 10)
-    publisher = node.create_publisher(Int32, 'count', 10)
-    for number in range(5):
-        publisher.publish(Int32(data=number))
-    with spinning(executor):
-        wait_for(lambda: len(got) == 5)
-
-
 def test_a_slow_subscription_drops_as_its_depth_says(node: Any, executor: Any) -> None:
     got: list[int] = []
     began = threading.Event()
@@ -148,14 +138,6 @@ def stays_silent(timer: Any, ticks: list[int]) -> bool:
         last = now
     assert not ticks
     return True
-
-
-def test_a_timer_that_is_always_reset_never_fires(node: Any, executor: Any) -> None:
-    ticks: list[int] = []
-    timer = node.create_timer(0.5, lambda: ticks.append(1))
-    with spinning(executor):
-        wait_for(lambda: stays_silent(timer, ticks))
-        wait_for(lambda: ticks)
 
 
 def test_a_timer_follows_simulated_time(context: Context, executor: Any) -> None:
@@ -281,15 +263,6 @@ def test_an_async_service_and_an_async_caller(node: Any, executor: Any) -> None:
         assert not answers
         gate.set_result(None)
         wait_for(lambda: answers == ['hello'])
-
-
-def test_calls_at_once_are_all_answered(node: Any, executor: Any) -> None:
-    client = node.create_client(Trigger, 'greet')
-    node.create_service(Trigger, 'greet', lambda _, r: _with_greeting(r))
-    with spinning(executor):
-        assert client.wait_for_service(DEADLINE_SEC)
-        calls = [client.call_async(Trigger.Request()) for _ in range(9)]
-        wait_for(lambda: all(call.done() for call in calls))
 
 
 def test_parameter_services_answer(node: Any, executor: Any, context: Context) -> None:

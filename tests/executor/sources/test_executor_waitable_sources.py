@@ -1,7 +1,6 @@
 """Guard conditions, waitables, QoS events and actions."""
 
 import asyncio
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -256,8 +255,7 @@ def test_a_goal_can_be_sent_and_awaited_in_a_callback(node: Any, executor: Any) 
         wait_for(lambda: done == [4])
 
 
-@pytest.mark.parametrize('how', ['spin', 'spin_once'])
-def test_finished_goals_expire(context: Context, executor: Any, how: str) -> None:
+def test_finished_goals_expire(context: Context, executor: Any) -> None:
     held: list[int] = []
 
     def execute(goal: Any) -> Any:
@@ -268,13 +266,8 @@ def test_finished_goals_expire(context: Context, executor: Any, how: str) -> Non
     node = rclpy.create_node('acting', context=context)
     server = ActionServer(node, Fibonacci, 'fibonacci', execute, result_timeout=0.3)
     client = ActionClient(node, Fibonacci, 'fibonacci')
-    if how == 'spin':
-        executor.add_node(node)
-        threading.Thread(target=executor.spin, daemon=True).start()
 
     def wait_spinning(condition: Callable[[], Any]) -> None:
-        if how == 'spin':
-            wait_for(condition)
         end = time.monotonic() + DEADLINE_SEC
         while not condition():
             assert time.monotonic() < end
@@ -358,25 +351,6 @@ def _is_constant(read: Callable[[], int]) -> bool:
     before = read()
     time.sleep(0.3)
     return read() == before
-
-
-def test_qos_events_do_not_cost_a_wake_up_for_each_message(
-    node: Any, executor: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(wait_set_thread, '_PAUSE_SEC', 10 * DEADLINE_SEC)
-    waits = _Waits(monkeypatch)
-    got: list[int] = []
-    callbacks = SubscriptionEventCallbacks(liveliness=lambda _: None)
-    node.create_subscription(Empty, 'busy', lambda _: got.append(1), 1, event_callbacks=callbacks)
-    publisher = node.create_publisher(Empty, 'busy', 1)
-    with spinning(executor):
-        wait_for(lambda: publisher.get_subscription_count() == 1)
-        wait_for(lambda: _is_constant(lambda: waits.count))
-        before = waits.count
-        for count in range(1, 100):
-            publisher.publish(Empty())
-            wait_for(lambda count=count: len(got) == count)
-        assert waits.count - before < 10
 
 
 def test_thousands_of_default_events_are_asked_for_in_turn(node: Any, executor: Any) -> None:
