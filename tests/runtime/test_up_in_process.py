@@ -156,34 +156,33 @@ print(json.dumps([
     assert left == []
 
 
-def test_levels_of_loggers_are_as_before_when_a_system_has_ended(compose, run_program):
-    path = compose.write(SYSTEM.replace('  talker:\n', '  talker:\n    log_level: error\n'), CODE)
+def test_all_is_as_before_when_a_system_has_ended_that_had_arguments(compose, run_program):
+    text = SYSTEM.replace('  talker:\n', '  talker:\n    log_level: error\n')
+    text = text.replace('parts:look', 'parts:tell').replace(
+        'nodes:\n',
+        'environment: {MODE: fast, RCUTILS_CONSOLE_OUTPUT_FORMAT: "{message}"}\nnodes:\n',
+    )
+    tell = 'def tell(node):\n    print(node.state.heard, os.environ["MODE"])\n'
+    path = compose.write(text, f'{CODE}\n{tell}')
     program = """
-import sys
+import os, sys
 import composer
 from rclpy.logging import get_logger_level, set_logger_level, LoggingSeverity
 
+os.environ['MODE'] = 'slow'
+os.environ.pop('RCUTILS_CONSOLE_OUTPUT_FORMAT', None)
+before = dict(os.environ)
 set_logger_level('listener', LoggingSeverity.WARN)
-composer.up(sys.argv[1], log_levels=['listener:=debug'])
-print([get_logger_level(name).name for name in ('talker', 'listener')])
+arguments = ['-p', 'listener:enough:=5']
+code = composer.up(sys.argv[1], log_levels=['listener:=debug'], ros_arguments=arguments)
+levels = [get_logger_level(name).name for name in ('talker', 'listener')]
+print(code, *levels, before == dict(os.environ))
 """
-
-    assert run_program(program, path.name) == "['UNSET', 'WARN']\n"
-
-
-def test_ros_arguments_are_those_of_a_command_line(compose, run_program):
-    path = compose.write(SYSTEM, f'{CODE}\ndef tell(node):\n    print(node.state.heard)\n')
-    path.write_text(path.read_text().replace('parts:look', 'parts:tell'))
-    program = """
-import sys
-import composer
-
-print(composer.up(sys.argv[1], ros_arguments=['-p', 'listener:enough:=5']))
-"""
-    heard, code = run_program(program, path.name).split()
+    heard, mode, *after = run_program(program, path.name).split()
 
     assert int(heard) >= 5
-    assert code == '0'
+    assert mode == 'fast'
+    assert after == ['0', 'UNSET', 'WARN', 'True']
 
 
 def test_two_systems_run_at_the_same_time_in_one_process(compose, run_program):

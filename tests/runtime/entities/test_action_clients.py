@@ -316,9 +316,8 @@ def test_a_signal_ends_timers_that_wait_for_goals(compose):
     check_that_a_signal_ends_it(child, waiting=len(WAITING))
 
 
-@pytest.mark.parametrize('behaviour', ['wait_for_result_async', 'wait_for_feedback'])
-def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose, behaviour):
-    clients = {'client': (f'on_start: parts:{behaviour}', '')}
+def test_a_signal_ends_an_on_start_that_waits_for_a_goal(compose):
+    clients = {'client': ('on_start: parts:wait_for_result_async', '')}
     check_that_a_signal_ends_it(compose(acting(clients, {'act': 'forever'}), CODE), code=130)
 
 

@@ -61,35 +61,40 @@ def test_one_node_runs_one_behaviour_at_a_time_by_default(compose):
     assert set(child.matching('inside')) == {'[INFO] [strict]: inside: 1'}
 
 
-@pytest.mark.parametrize(
-    ('first', 'second'),
-    [('', ', group: other'), (', group: reentrant', ', group: reentrant')],
-)
-def test_behaviours_of_different_or_reentrant_groups_run_at_the_same_time(compose, first, second):
-    text = f"""
-        version: 1
-        nodes:
-          parallel:
-            timers:
-              one: {{period: 0.05, behaviour: 'parts:meet'{first}}}
-              two: {{period: 0.05, behaviour: 'parts:meet'{second}}}
-    """
-    child = compose(text, CODE.format(timeout=30))
+MEETING = """
+version: 1
+executor: {threads: 16}
+nodes:
+  groups:
+    timers:
+      one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: groups}}
+      two: {period: 0.05, behaviour: 'parts:meet_at', with: {key: groups}, group: other}
+  reentrant:
+    timers:
+      one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: reentrant}, group: reentrant}
+      two: {period: 0.05, behaviour: 'parts:meet_at', with: {key: reentrant}, group: reentrant}
+  itself:
+    timers:
+      one: {period: 0.02, behaviour: 'parts:meet_at', with: {key: itself}, group: reentrant}
+  left: {timers: {one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: nodes}}}}
+  right: {timers: {one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: nodes}}}}
+"""
+MEET_AT = """
+barriers = {key: threading.Barrier(2) for key in ('groups', 'reentrant', 'itself', 'nodes')}
 
-    child.wait_for_line('[INFO] [parallel]: met', times=2)
+def meet_at(node, key):
+    barriers[key].wait(timeout=30)
+    node.logger.info('met')
+"""
 
 
-def test_behaviours_of_different_nodes_run_at_the_same_time(compose):
-    text = """
-        version: 1
-        nodes:
-          one: {timers: {meet: {period: 0.05, behaviour: 'parts:meet'}}}
-          two: {timers: {meet: {period: 0.05, behaviour: 'parts:meet'}}}
-    """
-    child = compose(text, CODE.format(timeout=30))
+def test_behaviours_of_other_nodes_and_of_other_or_reentrant_groups_run_at_the_same_time(compose):
+    child = compose(MEETING, CODE.format(timeout=30) + MEET_AT)
 
-    child.wait_for_line('[INFO] [one]: met')
-    child.wait_for_line('[INFO] [two]: met')
+    for name in ('groups', 'reentrant', 'itself'):
+        child.wait_for_line(f'[INFO] [{name}]: met', times=2)
+    for name in ('left', 'right'):
+        child.wait_for_line(f'[INFO] [{name}]: met')
 
 
 def test_behaviours_of_one_named_group_do_not_run_at_the_same_time(compose):
@@ -105,17 +110,6 @@ def test_behaviours_of_one_named_group_do_not_run_at_the_same_time(compose):
     child.wait_for_line('met nobody', times=3)
 
     assert not [line for line in child.lines if line.endswith(': met')]
-
-
-def test_a_reentrant_timer_overlaps_itself(compose):
-    text = """
-        version: 1
-        nodes:
-          parallel: {timers: {meet: {period: 0.02, behaviour: 'parts:meet', group: reentrant}}}
-    """
-    child = compose(text, CODE.format(timeout=30))
-
-    child.wait_for_line('[INFO] [parallel]: met', times=2)
 
 
 def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(node):
