@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, Final
 import foxglove
 from foxglove.websocket import Capability
 from rclpy.exceptions import InvalidHandle
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from websockets import Subprotocol
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
@@ -74,7 +73,6 @@ class FoxgloveBridge(GraphAccess):
 
     Attributes:
         queue: Takes messages, and they are sent soon.
-        serializes: Messages in bursts, which costs less than one by one where they are published.
         room: How many messages may wait to be sent.
         lost: How many did not, as there was no room.
 
@@ -82,7 +80,7 @@ class FoxgloveBridge(GraphAccess):
         StartError: The port is taken.
     """
 
-    serializes, room, lost = True, _ROOM, 0
+    room, lost = _ROOM, 0
 
     def __init__(self, options: BridgeOptions, name: str, log: Log) -> None:
         super().__init__(allows_changes=options.allows_changes)
@@ -161,15 +159,13 @@ class FoxgloveBridge(GraphAccess):
 
     def _send(self) -> None:
         """Send what comes in bursts: to wake a thread for each message costs far more."""
-        entries, serialize = self.queue, _rclpy.rclpy_serialize
+        entries = self.queue
         while not self._ended.wait(_BURST_SEC):
             # What came as the last one left is nothing for the next one.
             self._is_wanted.wait(_LOOK_SEC)
             for _ in range(len(entries)):
                 channel, _, published_ns, data = entries.popleft()
                 try:
-                    if type(data) is not bytes:
-                        data = serialize(data, type(data))
                     channel.base.log(data, log_time=published_ns)
                 except Exception as error:  # noqa: BLE001 - a message costs no more than itself
                     self._warn_once(f"a message of '{channel.topic}' is left out: {error}")

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from composer.recordings.mcap_writer import Channel
     from composer.recordings.recording_place import RecordingPlace
 
-# A message: its channel, when it was received and published (ns since 1970), and its data; for who
-# serializes itself, perhaps the message.
-Entry: TypeAlias = 'tuple[Channel, int, int, Any]'
+# A message: its channel, when it was received and published (ns since 1970), and its data.
+Entry: TypeAlias = 'tuple[Channel, int, int, bytes]'
 
 _PAUSE_SEC: Final = 0.05
 # How long a killed recorder may have kept a message to itself.
@@ -66,7 +65,6 @@ class Queue(Protocol):
 class Sink(Protocol):
     """What is done with messages of topics; see `Recorder`."""
 
-    serializes: bool
     room: int
     lost: int
 
@@ -91,7 +89,6 @@ class Recorder:
 
     Attributes:
         queue: Who has a message appends it, unless it has `room` messages.
-        serializes: Whether it takes messages as they are.
         room: How many messages may wait; 0 if nothing is recorded any more.
         lost: How many were not appended as there was no room.
 
@@ -99,8 +96,6 @@ class Recorder:
         UsageError: The place is taken, or not there.
         ComposerError: The file cannot be written, or the library for recordings is not installed.
     """
-
-    serializes = False
 
     def __init__(self, place: RecordingPlace, log: Log) -> None:
         require_mcap()

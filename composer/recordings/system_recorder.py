@@ -11,15 +11,13 @@ from functools import partial
 from time import time_ns
 from typing import TYPE_CHECKING, Any, Final
 
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-
+from composer.recordings.cdr import serializer_of
 from composer.recordings.graph_recorder import GraphRecorder, read_offer
 from composer.recordings.recorder import Recorder
 from composer.recordings.recording_place import find_place
 from composer.recordings.serialized_messages import identify_publisher
 from composer.recordings.topic_patterns import TopicPatterns
 from composer.runtime.messages.local_delivery import is_latched
-from composer.runtime.messages.ownership import ownership_of
 from composer.runtime.middleware.ros_graph import create_graph_node
 
 if TYPE_CHECKING:
@@ -143,18 +141,14 @@ def create_tap(
     report: Callable[[str], object],
 ) -> Tap:
     """Return what records a message of a publisher, in the thread that publishes it."""
-    serialize, queue, append = _rclpy.rclpy_serialize, recorder.queue, recorder.queue.append
-    serializes, take = recorder.serializes, ownership_of(message_class).take
+    queue, append, serialize = recorder.queue, recorder.queue.append, serializer_of(message_class)
 
-    def tap(message: Any, may_keep: bool) -> None:  # noqa: FBT001 - as `Tap`
+    def tap(message: Any) -> None:
         if len(queue) >= recorder.room:
             recorder.lost += 1
             return
         try:
-            if may_keep and serializes:
-                data = take(message, is_held=False)
-            else:
-                data = serialize(message, message_class)
+            data = serialize(message)
         except Exception as error:  # noqa: BLE001 - whoever publishes it is told by rclpy
             report(f"a message of '{channel.topic}' is left out: {error}")
             return

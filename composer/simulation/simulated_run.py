@@ -92,7 +92,7 @@ class SimulatedRun(System):
 
         deliver = partial(publisher.deliver, is_held=False)
 
-        def tap(message: Any, _may_keep: bool) -> bool:  # noqa: FBT001 - as `Tap`
+        def tap(message: Any) -> bool:
             observe('message', node, topic, copy(message))
             return self.faults.take(topic, partial(copy, message), deliver)
 

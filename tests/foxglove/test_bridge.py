@@ -239,9 +239,8 @@ def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog)
         wait_for(lambda: bridge.has('/time'), 'the subscription')
         channel = bridge.open_channel('/time', Int64)
         # The clock of a publisher may be before 1970.
-        for stamp_ns in (-1, -2, 1):
+        for stamp_ns in (-1, -2, 1, 2):
             bridge.queue.append((channel, 0, stamp_ns, serialize_message(Int64(data=stamp_ns))))
-        bridge.queue.append((channel, 0, 2, Int64(data=2)))
         assert [message.data for message in one.messages(1, Int64, 2)] == [1, 2]
     [warning] = [each.message for each in caplog.records if each.levelname == 'WARNING']
     assert warning.startswith("a message of '/time' is left out: ")

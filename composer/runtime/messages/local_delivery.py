@@ -56,9 +56,8 @@ class LocalPublisher:
         is_local: Whether it may hand messages over.
         reason: Why its messages are always sent; empty if they are handed over while nobody
             outside listens.
-        tap: Called with each message before it goes anywhere, and with whether it may keep it, as
-            `Ownership.take` returns it: else it must not change or keep it. What it returns true
-            for goes nowhere.
+        tap: Called with each message before it goes anywhere; it must not change or keep it. What
+            it returns true for goes nowhere.
         published: How many messages it was given.
     """
 
@@ -144,7 +143,7 @@ class LocalPublisher:
         self.published += 1
         # A client that leaves takes it away, in another thread.
         tap = self.tap
-        if tap is None or not tap(message, not is_held and not self._inboxes):
+        if tap is None or not tap(message):
             self.deliver(message, is_held=is_held)
 
     def deliver(self, message: Any, *, is_held: bool) -> None:
@@ -210,7 +209,7 @@ class LocalPublisher:
             inbox.put(message)
 
 
-Tap: TypeAlias = 'Callable[[Any, bool], object]'
+Tap: TypeAlias = 'Callable[[Any], object]'
 FindTap: TypeAlias = 'Callable[[LocalPublisher], Tap | None]'
 _Receiver: TypeAlias = 'Inbox | TracedInbox'
 
@@ -318,9 +317,9 @@ class LocalTopics:
             name = publisher.node.get_fully_qualified_name()
             taps.append(tracer.create_tap(name, publisher.ros.topic_name))
 
-        def tell_all(message: Any, may_keep: bool) -> bool:  # noqa: FBT001 - as `Tap`
+        def tell_all(message: Any) -> bool:
             # All are told.
-            return sum(bool(tap(message, may_keep)) for tap in taps) > 0
+            return sum(bool(tap(message)) for tap in taps) > 0
 
         publisher.tap = (tell_all if taps[1:] else taps[0]) if taps else None
         publisher.follow_tracer()

@@ -161,10 +161,10 @@ class Tracer:
         now_ns = self.now_ns()
         self.add((kind, node, MARKS, name, now_ns, now_ns, value))
 
-    def create_tap(self, node: str, topic: str) -> Callable[[Any, bool], None]:
+    def create_tap(self, node: str, topic: str) -> Callable[[Any], None]:
         """Return what notes a message that is published."""
 
-        def tap(_message: Any, _may_keep: bool) -> None:  # noqa: FBT001 - a `Tap`
+        def tap(_message: Any) -> None:
             now_ns = self.now_ns()
             self.add(('publish', node, get_ident(), topic, now_ns, now_ns, 0))
 

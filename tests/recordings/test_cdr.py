@@ -1,0 +1,48 @@
+"""Messages are serialized as rclpy has them serialized."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import String
+from test_msgs.msg import BasicTypes
+
+from composer.interfaces.catalogue import InterfaceCatalogue
+from composer.interfaces.classes import import_interface
+from composer.recordings.cdr import serializer_of
+from tests.recorded import filled
+
+pytestmark = pytest.mark.ros
+
+
+def test_every_type_is_serialized_as_by_rclpy():
+    for name in InterfaceCatalogue().names('msg'):
+        message_class = import_interface(name)
+        for message in (message_class(), filled(message_class)):
+            ours = serializer_of(message_class)(message)
+            theirs = serialize_message(message)
+            # Theirs may have a gap at the end, and has anything in gaps.
+            assert len(ours) <= len(theirs) < len(ours) + 4, name
+            assert repr(deserialize_message(ours, message_class)) == repr(message), name
+
+
+@pytest.mark.parametrize(
+    ('message_class', 'name', 'value'),
+    [
+        (String, 'data', 'a\0b'),
+        (String, 'data', '\ud800'),
+        (BasicTypes, 'int32_value', 1 << 40),
+        (BasicTypes, 'float32_value', 1e300),
+    ],
+)
+def test_what_does_not_fit_is_left_to_rclpy(message_class, name, value):
+    message = message_class()
+    setattr(message, f'_{name}', value)
+    outcomes = []
+    for serialize in (serializer_of(message_class), serialize_message):
+        try:
+            outcomes.append(repr(deserialize_message(serialize(message), message_class)))
+        except UnicodeEncodeError as error:
+            outcomes.append(repr(error))
+    assert outcomes[0] == outcomes[1]
