@@ -17,14 +17,6 @@ from composer.names import (
 NODE = 'rover'
 NAMESPACES = ['/', '/fleet', '/fleet/first']
 
-TOPICS = [
-    'a', 'A_1', '_a', 'a/b', '/a/b', '~', '~/a', '~/a/b', '{node}', '{node}/a', 'a/{node}', '{ns}/a',
-    '{namespace}', '/{node}/a', 'a{node}b', '__a', 'a__b', 'a' * 240,
-    '', '/', '//', 'a/', '/a/', 'a//b', '//a', '~/', '~//a', '~a', '~~', 'a~', 'a/~/b', '/~', '1a',
-    'a/1b', '/1', 'a b', 'a-b', 'a.b', 'a:b', 'é', 'a\n', '{', '}', '{node', 'node}', '{}', '{a}',
-    '{{node}}', '{n s}', '{node}1', '1{node}', '{ns}', '/{ns}', 'a/{ns}', '{ns}{ns}', 'a' * 248,
-]  # fmt: skip
-
 
 def is_topic_of_ros(name, namespace):
     """Return whether rclpy takes a name as that of a topic of a node."""
@@ -75,15 +67,11 @@ generated = st.lists(fragments, max_size=7).map(''.join)
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('namespace', NAMESPACES)
-def test_topics_are_named_as_rclpy_has_it(namespace):
-    for name in TOPICS:
-        agree_on_topic(name, namespace)
-
-
-@pytest.mark.ros
 @settings(max_examples=500, deadline=None, derandomize=True)
 @given(generated, st.sampled_from(NAMESPACES))
+@example('a' * 240, '/fleet')
+@example('a' * 248, '/')
+@example('a__b', '/')
 def test_any_topic_is_named_as_rclpy_has_it(name, namespace):
     agree_on_topic(name, namespace)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.spelling import count_edits, find_nearest, suggest
+from composer.spelling import find_nearest, suggest
 
 
 @pytest.mark.parametrize(
@@ -39,36 +39,6 @@ def test_the_help_is_a_spelling_or_the_options():
     assert suggest('timer', ['timers'], 'it has', 'it has none') == "did you mean 'timers'?"
     many = [f'n{number:02}' for number in range(20)]
     assert suggest('xyz', many, 'they are') == f'they are: {", ".join(many[:12])}, …'
-
-
-@pytest.mark.parametrize(
-    ('word', 'options', 'meant'),
-    [
-        ('turn', ['turn3d', 'tunr'], 'tunr'),
-        ('form', ['former', 'from'], 'from'),
-    ],
-)
-def test_of_words_that_look_alike_the_fewest_edits_decide(word, options, meant):
-    assert find_nearest(word, options) == meant
-    assert find_nearest(word, reversed(options)) == meant
-
-
-@pytest.mark.parametrize(
-    ('word', 'other', 'edits'),
-    [
-        ('scan', 'scan', 0),
-        ('scan', 'sacn', 1),
-        ('scan', 'scann', 1),
-        ('scan', 'sca', 1),
-        ('scan', 'span', 1),
-        ('scan', 'nacs', 3),
-        ('', 'scan', 4),
-        ('a' * 900, 'b' * 900, 64),
-    ],
-)
-def test_edits_are_counted(word, other, edits):
-    assert count_edits(word, other) == edits
-    assert count_edits(other, word) == edits
 
 
 def test_only_strings_have_a_spelling():

@@ -81,9 +81,8 @@ def test_a_file_with_errors_fails_with_all_of_them(run):
     assert out.replace(f'{folder}/', '') == expected + '\n'
 
 
-@pytest.mark.parametrize('name', ['talker_listener', 'parameter'])
-def test_check_imports_nothing_of_ros(name):
-    path = ROOT / 'configs' / f'{name}.yaml'
+def test_check_imports_nothing_of_ros():
+    path = ROOT / 'configs' / 'parameter.yaml'
     result = run_without_ros('check', path)
     assert (result.returncode, result.stderr) == (0, '')
     assert result.stdout.startswith(f'{path}: ok, ')
@@ -121,28 +120,14 @@ def test_names_of_files_may_be_any_bytes(tmp_path):
     [
         ['chek'],
         ['check'],
-        ['check', '--fast', 'a.yaml'],
         ['up'],
-        ['up', 'a.yaml', '--fast'],
-        ['up', 'a.yaml', '--log-level', 'loud'],
         ['up', 'a.yaml', '--log-level', 'talker:=loud'],
-        ['up', '-x'],
-        ['up', ''],
         ['up', 'a.yaml', '--set'],
-        ['show'],
-        ['show', 'a.yaml', '--fast'],
         ['show', 'a.yaml', '--args', '--params'],
         ['show', 'a.yaml', '--origin', '--format', 'json'],
-        ['graph'],
         ['graph', 'a.yaml', '--output', 'a.pdf'],
-        ['check', 'a.yaml', '--format', 'yaml'],
-        ['check', 'a.yaml', '--ignore', 'bad-nam'],
         ['check', 'a.yaml', '--ignore', 'bad-name', '--expect', 'bad-name'],
-        ['explain', 'bad-nam'],
-        ['new'],
-        ['new', 'My-Robot'],
         ['interfaces', 'bild'],
-        ['interfaces', 'build'],
         ['--nonsense'],
     ],
 )
@@ -205,12 +190,9 @@ def test_the_version_is_told(run):
     assert out.startswith('composer, version ')
 
 
-@pytest.mark.parametrize(
-    'raised', [RuntimeError('boom'), AssertionError(), RecursionError('deep')]
-)
-def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
+def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch):
     def fail(path, **more):
-        raise raised
+        raise RuntimeError
 
     monkeypatch.setattr('composer.application.check.load_combinations', fail)
     code, out, err = run('check', GREETER)
@@ -220,7 +202,7 @@ def test_a_bug_is_exit_code_3_with_a_report(run, monkeypatch, raised):
         'This is a bug in Composer, not in your file. Please report it with the lines below.'
     )
     assert f"  arguments: ['check', '{GREETER}']" in lines
-    assert lines[-1].startswith(type(raised).__name__)
+    assert lines[-1] == 'RuntimeError'
 
 
 @pytest.mark.parametrize(

@@ -173,9 +173,7 @@ def test_its_scenario_fails_if_the_system_does_not_work(project, monkeypatch, ca
 @pytest.mark.parametrize(
     ('name', 'near'),
     [
-        ('MyRobot', 'myrobot'),
-        ('my-robot', 'my_robot'),
-        ('robots/arm', 'robots_arm'),
+        ('robots/My-Arm', 'robots_my_arm'),
         ('x\n', 'x'),
     ],
 )

@@ -183,7 +183,7 @@ nodes:
 """
 
 
-@pytest.mark.parametrize('name', ['a b', '100%', '$HOME', '"q"', 'ünï 机', '-x', 'a@b'])
+@pytest.mark.parametrize('name', ['a "b" $HOME', '-100%', 'ünï@机'])
 def test_awkward_names_and_values_arrive_as_they_were(export, project, verify_unit, name):
     file = project(ODD_SYSTEM, name)
     folder = file.parent / 'a $x %h "q" ü'

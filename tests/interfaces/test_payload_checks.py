@@ -126,44 +126,6 @@ def test_every_finding_is_found_at_its_place_in_the_data(catalogue: InterfaceCat
     ]
 
 
-def test_bare_values_lie_where_the_message_does(catalogue: InterfaceCatalogue) -> None:
-    assert list(check_payload(THING, {'path': [{'x': None}]}, catalogue)) == [
-        FieldFinding(
-            ('path', 0, 'x'),
-            'my_msgs/msg/Thing: path.points[0].x: expected float64, got None',
-            None,
-            'field-type',
-        ),
-    ]
-    assert list(check_payload(TEXT, None, catalogue)) == [
-        FieldFinding(
-            (),
-            'my_msgs/msg/Text: data: expected string, got None',
-            None,
-            'field-type',
-        ),
-    ]
-
-
-def test_a_message_that_is_none_is_a_finding_of_the_message(catalogue: InterfaceCatalogue) -> None:
-    assert list(check_payload(VECTOR, None, catalogue)) == [
-        FieldFinding(
-            (),
-            'expected my_msgs/msg/Vector, got None',
-            'give its fields by name: x, y',
-            'field-type',
-        ),
-    ]
-    assert list(check_payload(EMPTY, 0, catalogue)) == [
-        FieldFinding(
-            (),
-            'expected my_msgs/msg/Empty, got int 0',
-            'it has no fields: write {}',
-            'field-type',
-        ),
-    ]
-
-
 def test_what_the_catalogue_does_not_describe_is_taken_as_right(
     catalogue: InterfaceCatalogue,
 ) -> None:

@@ -101,16 +101,10 @@ def conversion_problem(name: str, data: object) -> str | None:
 
 NAMES = [
     'std_msgs/msg/String',
-    'std_msgs/msg/Byte',
-    'std_msgs/msg/Empty',
-    'std_msgs/msg/Float32MultiArray',
     'std_msgs/msg/ByteMultiArray',
     'shape_msgs/msg/SolidPrimitive',
     'test_msgs/msg/BasicTypes',
     'test_msgs/msg/Strings',
-    'test_msgs/msg/WStrings',
-    'test_msgs/msg/Nested',
-    'test_msgs/msg/Builtins',
     'test_msgs/msg/Arrays',
     'test_msgs/msg/BoundedSequences',
 ]

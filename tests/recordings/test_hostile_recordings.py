@@ -57,24 +57,9 @@ def part_elsewhere(path):
     write_topics(path, kind='odd_msgs/msg/Odd', text=PARTED.format('../../escaped'))
 
 
-@case('which is no type of ROS')
-def long_part(path):
-    write_topics(path, kind='odd_msgs/msg/Odd', text=PARTED.format(f'x/{"Y" * 300}'))
-
-
-@case("'../../../escaped' is no type of ROS")
-def type_elsewhere(path):
-    write_topics(path, kind='../../../escaped')
-
-
 @case('the definition of odd_msgs/msg/Odd has more than 2 MB')
 def large_definition(path):
     write_topics(path, kind='odd_msgs/msg/Odd', text='a' * 3_000_000)
-
-
-@case('a topic name is not empty')
-def no_name(path):
-    write_topics(path, [''])
 
 
 @case(r'\x1b')
@@ -90,11 +75,6 @@ def endless_time(path):
 @case('has more than')
 def zstd_bomb(path):
     write_chunk(path, 'zstd', zstandard.compress(bytes(1_900_000_000)), 1_900_000_000)
-
-
-@case('a chunk has more than it says')
-def lying_zstd(path):
-    write_chunk(path, 'zstd', zstandard.compress(bytes(1_000_000_000)), 1000)
 
 
 @case('a chunk has more than it says')
@@ -120,19 +100,6 @@ def many_lz4_bombs(path):
     write_chunk(path, 'lz4', lz4.frame.compress(data), len(data), times=20)
 
 
-@case(SLOW)
-def bombs_as_summary(path):
-    """The index is said to be where the chunks are."""
-    data = bytes(90_000_000)
-    end = b'\2' + struct.pack('<QQQI', 20, 25, 0, 0) + MAGIC
-    write_chunk(path, 'zstd', zstandard.compress(data), len(data), times=1000, end=end)
-
-
-@case('is damaged')
-def negative_message(path):
-    path.write_bytes(MAGIC + b'\5' + struct.pack('<Q', 2) + bytes(100))
-
-
 @case('is damaged')
 def enormous_record(path):
     path.write_bytes(MAGIC + b'\x09' + struct.pack('<Q', 2**40) + bytes(100))
@@ -146,16 +113,6 @@ def fifo(path):
 @case('not a regular file')
 def device(path):
     path.symlink_to('/dev/zero')
-
-
-@case('Too many levels')
-def link_to_itself(path):
-    path.symlink_to(path.name)
-
-
-@case('topics')
-def many_topics(path):
-    write_topics(path, [f'/t{each}' for each in range(60_000)])
 
 
 @case('5,000 recorded types are not installed, and 500 are built at most')
@@ -181,14 +138,6 @@ def endless_aliases(path):
     levels = ''.join(f'a{i}: &a{i} [{", ".join([f"*a{i - 1}"] * 10)}]\n' for i in range(1, 10))
     text = f'a0: &a0 [x]\n{levels}rosbag2_bagfile_information: {{relative_file_paths: *a9}}\n'
     write_folder(path, text)
-
-
-@case('more than')
-def endless_merges(path):
-    levels = ''.join(
-        f'a{i}: &a{i} {{<<: [{", ".join([f"*a{i - 1}"] * 10)}]}}\n' for i in range(1, 9)
-    )
-    write_folder(path, f'a0: &a0 {{x: 1}}\n{levels}')
 
 
 # Those that a check reads more of, or otherwise, than of a short file with a wrong word in it.
@@ -252,21 +201,3 @@ def test_a_replay_says_what_is_wrong(name, in_folder):
     assert code == 1, output
     assert expected in output
     assert written(in_folder) == before
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize('size', ['string<=99999999999999999999', 'uint8[18446744073709551616]'])
-def test_sizes_that_no_memory_has_are_not_built(size, in_folder):
-    write_topics(Path('a.mcap'), kind='odd_msgs/msg/Odd', text=f'{size} a\n')
-
-    code, output = run_limited(in_folder, ['replay', 'a.mcap'], memory=600_000_000)
-
-    assert code == 1, output
-    assert "'/a' is not published" in output
-
-
-@pytest.mark.parametrize('start', ['1e308', 'nan'])
-def test_a_start_beyond_all_times_is_no_fault_of_composer(start, in_folder):
-    write_topics(Path('a.mcap'))
-    code, output = run_limited(in_folder, ['replay', 'a.mcap', '--start', start])
-    assert code in (0, 1, 2), output

@@ -6,7 +6,6 @@ from collections import Counter
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType, Writer
-from rosbags.highlevel import AnyReader
 
 from composer.recordings.reading import read_recording
 from composer.recordings.recorded_topics import RecordingError
@@ -49,42 +48,6 @@ def test_other_readers_find_all_messages_with_their_checksums(tmp_path, all_mess
         assert reader.get_summary().statistics.message_count == sum(counts.values())
 
 
-def test_rosbags_decodes_messages_by_the_definitions_in_the_file(tmp_path, all_messages):
-    # It knows no type wstring.
-    known = {key: each for key, each in all_messages.items() if 'wstrings' not in key}
-    path = write_recording(tmp_path / 'all.mcap', known)
-
-    with AnyReader([path]) as reader:
-        read = {
-            connection.topic: reader.deserialize(data, connection.msgtype)
-            for connection, _, data in reader.messages()
-        }
-
-    assert read.keys() == known.keys()
-    for topic, messages in known.items():
-        assert_alike(read[topic], messages[0])
-
-
-def assert_alike(theirs, ours):
-    for name in ours.get_fields_and_field_types():
-        if name == 'structure_needs_at_least_one_member':
-            continue
-        their, our = getattr(theirs, name), getattr(ours, name)
-        if hasattr(our, 'get_fields_and_field_types'):
-            assert_alike(their, our)
-        elif isinstance(our, bytes):
-            assert bytes([their % 256]) == our  # Here a byte has a sign.
-        elif isinstance(our, list) and our and hasattr(our[0], 'get_fields_and_field_types'):
-            for one, other in zip(their, our, strict=True):
-                assert_alike(one, other)
-        elif isinstance(our, list) and our and isinstance(our[0], bytes):
-            assert bytes(int(each) % 256 for each in their) == b''.join(our)
-        elif isinstance(our, int | float | str | bool):
-            assert their == our
-        else:
-            assert list(their) == list(our)
-
-
 def test_topics_say_their_type_count_and_qos(tmp_path):
     path = write_recording(tmp_path / 'a.mcap', {'/b': strings('x', 'y'), '/a': strings('z')})
 
@@ -98,7 +61,7 @@ def test_topics_say_their_type_count_and_qos(tmp_path):
     assert (recording.start_ns, recording.end_ns, recording.problem) == (1000, 1002, '')
 
 
-@pytest.mark.parametrize('cut', [1, 20, 200, 700])
+@pytest.mark.parametrize('cut', [20, 700])
 def test_a_file_that_is_cut_off_has_what_its_complete_chunks_hold(tmp_path, cut):
     texts = [f'{number:03}' for number in range(100)]
     path = write_recording(tmp_path / 'a.mcap', {'/a': strings(*texts)}, chunks=10, closes=False)

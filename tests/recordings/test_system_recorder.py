@@ -214,14 +214,6 @@ def test_a_full_disk_ends_the_recording_and_not_the_system(compose, tmp_path, wa
             2,
             ['error: --topics is for --record', '  help: name the file, as in --record run.mcap'],
         ),
-        (
-            ['--record', 'run.mcap', '--topics', ''],
-            2,
-            [
-                'error: an empty pattern matches no topic',
-                "  help: name topics, as in --topics '/camera/*'",
-            ],
-        ),
     ],
 )
 def test_wrong_use_is_an_error_before_the_start(compose, tmp_path, options, code, lines):

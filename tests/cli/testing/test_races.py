@@ -18,7 +18,7 @@ pytestmark = pytest.mark.ros
 RACES = Path(__file__).parents[2] / 'data' / 'races'
 SEEDS = int(os.environ.get('COMPOSER_RACE_SEEDS', '0'))
 QUICK = ['async_interleaving']
-QUICK_SEEDS = 8
+QUICK_SEEDS = 4
 
 
 def write(project, kind, race):

@@ -71,8 +71,6 @@ def test_options_choose_cases(project, run_json, words, outcomes):
 def test_without_cases_it_ends_as_pytest_does(project, capsys):
     assert run(['test']) == 5
     assert capsys.readouterr().err == 'no file matches tests/**/*.scenario.yaml\n'
-    assert run(['test', 'robots/*.yaml']) == 5
-    assert capsys.readouterr().err == 'no file matches robots/*.yaml\n'
     project.scenario(PASSING)
     assert run(['test', '-k', 'nothing']) == 5
     assert capsys.readouterr().err == 'no case has such a name\n'
@@ -123,12 +121,12 @@ def race(project):
 
 def test_a_shuffle_finds_the_order_that_fails_and_it_can_be_had_again(race, run_json):
     assert run_json()[0] == 0
-    code, report = run_json('--shuffle', '6')
+    code, report = run_json('--shuffle', '4')
     assert code == 1
     (case,) = report['cases']
     assert case['failures'] == []
     failing = [each for each in case['shuffled'] if each['failures']]
-    assert [each['seed'] for each in case['shuffled']] == [0, 1, 2, 3, 4, 5]
+    assert [each['seed'] for each in case['shuffled']] == [0, 1, 2, 3]
     difference = failing[0]['difference']
     assert difference[0] == 'the default order:'
     assert f'the order of seed {failing[0]["seed"]}:' in difference
