@@ -77,10 +77,15 @@ def test_a_node_starts_when_somebody_publishes_the_topic(compose, peer, wait_for
 
 
 def test_what_belongs_to_a_node_that_has_not_started_is_not_there(compose, peer):
+    pytest.importorskip('test_msgs')
     text = f"""
         version: 1
         nodes:
-          fourth: {{wait_for: {{node: /third}}, {WAITING}}}
+          fifth: {{wait_for: [{{action: count, timeout: 40}}, {{node: fourth}}], {WAITING}}}
+          fourth:
+            wait_for: {{node: /third}}
+            actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}
+            {WAITING}
           third:
             wait_for: {{service: ask}}
             {WAITING}
@@ -98,7 +103,7 @@ def test_what_belongs_to_a_node_that_has_not_started_is_not_there(compose, peer)
     peer.run(peer.node.create_service, Trigger, 'go', lambda _request, response: response)
     child.wait_until_ready()
 
-    names = ['first', 'second', 'third', 'fourth']
+    names = ['first', 'second', 'third', 'fourth', 'fifth']
     assert child.matching('starts') == [f'[INFO] [{name}]: starts' for name in names]
     assert child.stop() == 0
     assert heard == []
@@ -124,24 +129,6 @@ def test_a_node_answers_nobody_before_it_starts(compose, peer):
     peer.run(peer.node.create_publisher, String, 'words', 1)
     child.wait_until_ready()
     assert peer.call(Trigger, 'ask').success
-
-
-def test_an_action_is_waited_for(compose):
-    text = f"""
-        version: 1
-        nodes:
-          user:
-            wait_for: [{{action: count, timeout: 40}}, {{node: server}}]
-            {WAITING}
-          server:
-            actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}
-            on_start: {{behaviour: 'parts:tell', with: {{text: serves}}}}
-    """
-    pytest.importorskip('test_msgs')
-    child = compose(text, CODE)
-    child.wait_until_ready()
-
-    assert child.matching('] [')[:2] == ['[INFO] [server]: serves', '[INFO] [user]: starts']
 
 
 def test_a_client_of_a_service_is_no_server(compose, peer, wait_for):

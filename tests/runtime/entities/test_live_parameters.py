@@ -346,26 +346,15 @@ def test_overrides_of_the_command_line_reach_the_nodes_that_they_name(compose):
     assert child.stop() == 0
 
 
-@pytest.mark.parametrize(
-    ('override', 'message'),
-    [
-        (
-            'first:rate:=2',
-            "error: node 'first': parameter 'rate' from the command line: Trying to set parameter "
-            "'rate' to '2' of type 'INTEGER', expecting type 'DOUBLE'\n  help: write 2.0",
-        ),
-        (
-            'first:mode:=c',
-            "error: node 'first': parameter 'mode' from the command line: "
-            "Invalid parameter value (c) for parameter. Reason: 'c' is not one of a, b",
-        ),
-    ],
-)
-def test_a_wrong_override_ends_the_start_with_a_clear_line(compose, override, message):
-    child = compose(OVERRIDDEN, TELL, '--ros-args', '-p', override)
+def test_a_wrong_override_ends_the_start_with_a_clear_line(compose):
+    child = compose(OVERRIDDEN, TELL, '--ros-args', '-p', 'first:rate:=2')
 
     assert child.wait() == 1
-    assert child.lines == message.splitlines()
+    assert child.lines == [
+        "error: node 'first': parameter 'rate' from the command line: Trying to set parameter "
+        "'rate' to '2' of type 'INTEGER', expecting type 'DOUBLE'",
+        '  help: write 2.0',
+    ]
 
 
 def test_parameters_are_a_mapping_with_what_a_mapping_offers(child):

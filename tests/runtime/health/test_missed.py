@@ -87,37 +87,18 @@ def test_messages_that_a_full_queue_drops_are_overruns(node, executor, wait_for,
         wait_for(lambda: slow.heard, 'the first message')
         for number in range(100):
             publisher.publish(Int32(data=number))
+        wait_for(lambda: missed() == MissedCounts(overruns=90), 'overruns of the full queue')
         slow.may_end.set()
         wait_for(lambda: slow.heard == [-1, *range(90, 100)], 'what was kept')
-        wait_for(
-            lambda: missed() == MissedCounts(overruns=90),
-            'overruns',
-        )
+        assert missed() == MissedCounts(overruns=90)
 
 
-def test_overruns_are_known_while_the_queue_is_full(node, executor, wait_for):
+def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
+    node, executor, wait_for, start_program
+):
     slow = Slow(node)
     missed = count_missed(executor, node, slow.entity)
-    publisher = advertise(node, 'RELIABLE', wait_for)
-    with spinning(executor):
-        publisher.publish(Int32(data=-1))
-        wait_for(lambda: slow.heard, 'the first message')
-        for number in range(100):
-            publisher.publish(Int32(data=number))
-        wait_for(
-            lambda: missed() == MissedCounts(overruns=90),
-            'overruns',
-        )
-        slow.may_end.set()
-
-
-@pytest.mark.parametrize('reliability', ['RELIABLE', 'BEST_EFFORT'])
-def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
-    node, executor, wait_for, start_program, reliability
-):
-    slow = Slow(node, reliability)
-    missed = count_missed(executor, node, slow.entity)
-    sender = start_program('-c', SENDER, reliability, '200', stdin=PIPE)
+    sender = start_program('-c', SENDER, 'RELIABLE', '200', stdin=PIPE)
     wait_for(slow.entity.get_publisher_count, 'the publisher')
     with spinning(executor):
         wait_for(lambda: slow.entity in executor_entities(executor, node), 'it to be seen')
@@ -125,11 +106,7 @@ def test_overruns_by_another_process_are_what_was_announced_and_not_taken(
         wait_for(lambda: missed().overruns, 'the first overrun')
         slow.may_end.set()
         wait_for(lambda: slow.heard[-1:] == [199], 'the last message')
-        if reliability == 'RELIABLE':
-            wait_for(
-                lambda: missed().overruns == 200 - len(slow.heard),
-                'the exact count',
-            )
+        wait_for(lambda: missed().overruns == 200 - len(slow.heard), 'the exact count')
 
 
 def test_subscriptions_that_keep_up_have_no_overruns(node, executor, wait_for):

@@ -41,9 +41,6 @@ def wait_long(node):
 def tick(node):
     node.logger.info('tick')
 
-def answer(node, request):
-    return {'success': True}
-
 def begin(node):
     node.logger.info('begins')
 """

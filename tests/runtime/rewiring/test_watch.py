@@ -53,10 +53,6 @@ def fail(node):
     raise OSError('no such device')
 
 
-def farewell(node):
-    node.logger.info('farewell')
-
-
 def hang(node):
     time.sleep(100)
 """
@@ -265,31 +261,6 @@ def test_nodes_that_hang_in_on_stop_make_way(running):
     assert len(running.child.matching("node 'brief' hangs, and is removed: on_stop")) == 2
     assert running.child.stop() == 1
     assert not running.child.matching('did not end in time')
-
-
-def test_values_set_live_stay(running, peer, wait_for):
-    counts = count_of(peer)
-    wait_for(lambda: counts, 'the first count')
-    running.edit('{step: 1}', '{step: 10}')
-    running.reloaded()
-    wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == 10, 'steps of 10')
-    running.edit('{step: 10}', '{step: {default: 10, description: how far}}')
-    running.reloaded()
-
-
-def test_values_come_and_go_in_parameter_files(running, peer, wait_for):
-    counts = count_of(peer)
-
-    def wait_for_steps(step):
-        wait_for(lambda: len(counts) > 2 and counts[-1] - counts[-2] == step, f'steps of {step}')
-
-    values = running.folder / 'values.yaml'
-    values.write_text('counter: {ros__parameters: {step: 2}}')
-    running.edit('{step: 1}', '{step: 1}\n    parameter_files: [values.yaml]')
-    wait_for_steps(2)
-    for text, step in (('3', 3), ('', 1), ('4', 4)):
-        values.write_text(f'counter: {{ros__parameters: {{step: {text}}}}}' if text else '')
-        wait_for_steps(step)
 
 
 def test_a_signal_during_a_reload_leaves_nothing(running):
