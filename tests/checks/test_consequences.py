@@ -42,23 +42,6 @@ def test_a_finding_is_said_alone(check, before, after, rule):
     assert [each for _, each in found] == [rule]
 
 
-@pytest.mark.ros
-def test_a_type_that_there_is_not_contradicts_no_annotation_and_no_relay(check):
-    nodes = """
-  listener:
-    publishers: {copy: {type: std_msgs/msg/String, external: true}}
-    subscriptions:
-      a: {type: std_msgs/msg/Strin, behaviour: parts:hear, external: true}
-      b: {type: std_msgs/msg/Strin, publish: copy, external: true}
-"""
-    code = """
-        from std_msgs.msg import String
-
-        def hear(node, message: String): ...
-    """
-    assert check(nodes, code) == [(6, 'unknown-type'), (7, 'unknown-type')]
-
-
 def test_what_is_meant_by_a_misspelt_name_is_used(check):
     nodes = """
   n:
@@ -110,16 +93,6 @@ def test_packages_of_interfaces_that_cannot_be_read_are_not_missed(check, interf
     nodes = spoil(SYSTEM, 'std_msgs/msg/String', 'my_msgs/msg/Text')
     nodes = spoil(nodes, 'std_msgs/msg/String', 'my_msgs/msg/Text')
     assert check(nodes, CODE, before=f'interfaces: {interfaces}\n') == [(2, 'wrong-type')]
-
-
-def test_a_process_with_a_finding_is_there(check):
-    nodes = """
-  n:
-    wait_for: {process: driver}
-processes:
-  driver: {command: []}
-"""
-    assert [rule for _, rule in check(nodes)] == ['out-of-range']
 
 
 def test_a_module_that_is_not_python_is_one_finding(check):
@@ -177,13 +150,3 @@ def test_a_parameter_file_may_be_for_a_node_without_a_right_name(check, tmp_path
     parameter_files: [site.yaml]
 """
     assert check(nodes) == [(3, 'bad-name')]
-
-
-def test_a_file_that_cannot_be_included_may_have_any_other_end(check):
-    before = 'include: {part: {file: part.yaml}}\n'
-    assert check(SYSTEM, CODE, before=before, installed=False) == [(2, 'missing-include')]
-    lonely = before + 'x: 1\n'
-    assert check(PUBLISHES, CODE, before=lonely, installed=False) == [
-        (2, 'missing-include'),
-        (3, 'unknown-key'),
-    ]

@@ -279,17 +279,3 @@ nodes:
         main.write_text(text % profile)
         findings = check_system(load_system(main), InterfaceCatalogue())
         assert [each.rule for each in findings] == rules
-
-
-@pytest.mark.parametrize(
-    ('nodes', 'rules'),
-    [
-        ('{planner: {}, controller_server: {}}', ['conflicting-keys']),
-        ('{planner: {}, controller: {}}', []),
-        ('{planner: {}}', []),
-    ],
-)
-def test_a_name_that_renames_several_nodes_is_found(nodes, rules):
-    process = f"nav:\n  command: ['true']\n  name: controller\n  nodes: {nodes}\n"
-    found = [each.rule for each in check(process, nodes='')]
-    assert found == rules

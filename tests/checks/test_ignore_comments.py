@@ -91,15 +91,6 @@ def test_what_only_an_import_may_show_is_no_unused_comment_without_it(check):
     ]
 
 
-def test_what_only_interfaces_show_is_no_unused_comment_without_them(check):
-    text = (
-        '    service_clients:\n'
-        '      switch: std_srvs/srv/SetBool  '
-        '# composer: ignore[unknown-type, no-server, unused-service-client]\n'
-    )
-    assert check(text, catalogue=InterfaceCatalogue(prefixes=[])) == []
-
-
 def test_while_findings_hide_others_no_comment_is_called_unused(check):
     found = check(
         '    log_levl: info\n    on_start: driving:start  # composer: ignore[bad-name]\n'

@@ -21,10 +21,8 @@ from rclpy.context import Context
 from rclpy.executors import ShutdownException
 from rclpy.task import Future
 from spinning import DEADLINE_SEC, spinning, wait_for, wait_until_quiet
-from std_msgs.msg import Empty
 
 from composer.executor import ComposerExecutor
-from composer.executor.c_bindings import Readiness
 from composer.executor.spinner import Notifier
 
 # A thread watches over the time: a deadlock outside of Python hears no signal.
@@ -281,28 +279,6 @@ def test_spin_once_ends_when_the_context_or_executor_ended_right_before_it_waits
 
     monkeypatch.setattr(spinner.poller, 'wait_if', wait_later)
     thread = threading.Thread(target=executor.spin_once, daemon=True)
-    thread.start()
-    thread.join(DEADLINE_SEC)
-    assert not thread.is_alive()
-
-
-def test_spin_ends_when_a_signal_ends_the_context_while_events_are_asked_for(
-    node: Any, executor: Any, context: Context, monkeypatch: Any
-) -> None:
-    list_happened = Readiness.list_happened
-    signalled: list[int] = []
-
-    def ask_in_vain(readiness: Any, events: Any) -> Any:
-        if not signalled:
-            signalled.append(1)
-            # As rclpy's thread for signals does it.
-            executor._sigint_gc.trigger()
-            context.handle.shutdown()
-        return list_happened(readiness, events)
-
-    monkeypatch.setattr(Readiness, 'list_happened', ask_in_vain)
-    node.create_subscription(Empty, 'looked_at', lambda _: None, 1)
-    thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
     thread.join(DEADLINE_SEC)
     assert not thread.is_alive()

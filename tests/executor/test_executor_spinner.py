@@ -282,36 +282,6 @@ def test_what_finds_no_thread_raises_and_leaves_nothing_behind(
     assert ticks
 
 
-def test_the_others_spin_on_after_one_thread_was_given_the_error_of_the_loop(
-    node: Any, executor: Any, monkeypatch: Any
-) -> None:
-    ticks: list[int] = []
-    node.create_timer(0.001, lambda: ticks.append(1))
-    registry = executor._spinner.registry
-    refresh = registry.refresh
-
-    def fail() -> None:
-        monkeypatch.setattr(registry, 'refresh', refresh)
-        raise ArithmeticError
-
-    scheduler = executor._spinner.scheduler
-    close_session = scheduler.close_session
-
-    def close_late(session: Any) -> None:
-        time.sleep(0.05)  # Those who woke with this thread have looked for an error by then.
-        close_session(session)
-
-    monkeypatch.setattr(scheduler, 'close_session', close_late)
-    with spinning(executor) as first, spinning(executor) as second, spinning(executor) as third:
-        wait_for(lambda: len(scheduler._unlimited) == 3 and ticks)
-        monkeypatch.setattr(registry, 'refresh', fail)
-        executor.wake()
-        wait_for(lambda: len(first) + len(second) + len(third) == 1)
-        seen = len(ticks)
-        wait_for(lambda: len(ticks) > seen + 3)
-        assert len(scheduler._unlimited) == 2
-
-
 @pytest.mark.filterwarnings('ignore:MultiThreadedExecutor is used with a single thread')
 def test_a_callback_may_spin_though_there_is_one_thread(context: Context) -> None:
     executor = ComposerExecutor(num_threads=1, context=context)

@@ -199,29 +199,6 @@ def test_a_cycle_over_two_files_names_the_way(write):
     assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
 
 
-@pytest.mark.parametrize(
-    ('include', 'rule'),
-    [
-        ('{file: amr.yaml}', 'missing-include'),
-        ('{file: leaf.yaml, args: {sdie: left}}', 'unknown-argument'),
-        ('{file: leaf.yaml, args: {joints: many}}', 'argument-type'),
-        ('{file: arm.yaml}', 'missing-argument'),
-        ('{file: middle.yaml}', 'include-cycle'),
-    ],
-)
-def test_what_is_wrong_with_an_include_comes_with_the_chain_of_includes(write, include, rule):
-    path = write(
-        arm=ARM,
-        leaf='version: 1\nargs: {joints: 2}\nnodes: {}',
-        middle=robot(include),
-        robot=robot('{file: middle.yaml}'),
-    )
-    (finding,) = load_system(path).diagnostics
-    assert finding.rule == rule
-    assert finding.span.source.name == 'middle.yaml'
-    assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
-
-
 # Includes in includes
 
 MIDDLE = """

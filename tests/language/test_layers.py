@@ -242,10 +242,3 @@ def test_a_setting_of_one_item_of_a_list_says_how_to_set_the_list(write):
     assert caught.value.help == (
         'give the whole list, as in --set "nodes.a.parameter_files=[first, second]"'
     )
-
-
-def test_a_wrong_key_in_a_setting_is_said_at_the_setting(write):
-    system = load(write(base='version: 1\nnodes: {a: {}}\n'), 'nodes.a.parametrs.x=3')
-    (finding,) = system.diagnostics
-    assert finding.rule == 'unknown-key'
-    assert str(finding.span) == '--set nodes.a.parametrs.x=3:1:1'

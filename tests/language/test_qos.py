@@ -63,12 +63,6 @@ def test_own_policies_win_over_those_of_the_profile():
     }
 
 
-def test_resolving_changes_no_profile():
-    before = {name: dict(policies) for name, policies in BUILTIN_PROFILES.items()}
-    resolve_qos(qos('sensor_data', depth=99), {})
-    assert before == BUILTIN_PROFILES
-
-
 def test_an_unknown_profile_is_told_with_the_qos_that_names_it():
     profiles = {'slow': qos('nowhere', ('qos', 'slow'))}
     with pytest.raises(QosError) as raised:
@@ -86,18 +80,6 @@ def test_profiles_that_lead_back_to_themselves_are_told(length):
     with pytest.raises(QosError, match=r"^the QoS profile 'p0' leads back to itself$") as raised:
         resolve_qos(qos('p0', ('here',)), profiles)
     assert raised.value.spec.path == ('qos', f'p{length - 1}')
-
-
-def test_an_unknown_profile_that_entities_share_by_an_alias_is_one_finding():
-    publisher = '{type: std_msgs/msg/String, qos: nope}'
-    system = load_system_text(
-        f'version: 1\nnodes: {{a: {{publishers: {{x: &shared {publisher}, y: *shared}}}}}}\n'
-    )
-    assert [each.rule for each in system.diagnostics] == ['unknown-qos-profile']
-    assert [each.qos.profile for each in system.spec.nodes['a'].publishers.values()] == [
-        'default',
-        'default',
-    ]
 
 
 def test_an_unknown_profile_of_a_service_is_a_finding():

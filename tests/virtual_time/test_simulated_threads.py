@@ -1,7 +1,6 @@
 """Threads that take turns: one at a time, always in the same order, and none is left behind."""
 
 import _thread
-import itertools
 import os
 import random
 import sys
@@ -16,13 +15,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from composer.errors import EndedWhileWaitingError
-from composer.virtual_time.clocks import MONOTONIC_START_NS
 from composer.virtual_time.originals import REAL
 from composer.virtual_time.simulated_thread import SimulatedThread
 from composer.virtual_time.simulated_threads import NothingHappensError
 from composer.virtual_time.stuck_threads import SimulationStuckError, StuckWatch
-from tests.virtual_time.virtual_runs import START_NS, virtual_time
+from tests.virtual_time.virtual_runs import virtual_time
 
 
 @given(
@@ -365,58 +362,6 @@ def test_chance_is_the_seed():
     assert run(1) == run(1)
     for one, other in zip(run(1), run(2), strict=True):
         assert one != other
-
-
-@pytest.mark.parametrize('seed', [None, 1])
-def test_what_comes_next_is_looked_for_in_virtual_time_in_threads_of_any_state(seed):
-    """Also in one that ends, raises, is ended, is outside, or runs a finalizer."""
-    clocks = {}
-
-    def look(place):
-        seen = time.monotonic_ns(), time.monotonic(), time.clock_gettime(time.CLOCK_REALTIME)
-        now_ns = threads.now_ns
-        is_virtual = seen == (
-            MONOTONIC_START_NS + now_ns,
-            (MONOTONIC_START_NS + now_ns) / 1e9,
-            (START_NS + now_ns) / 1e9,
-        )
-        # Not once the simulation has ended.
-        if threads.current is not None:
-            clocks.setdefault((place, threading.get_ident()), []).append(is_virtual)
-
-    class Kept:
-        def __del__(self):
-            look('finalizer')
-            threads.call_at(threads.now_ns + 1, lambda: look('due'))
-
-    def work(delay, end, kept):
-        with suppress(EndedWhileWaitingError):
-            time.sleep(delay)
-        end()
-
-    def stay_outside():
-        with threads.outside():
-            threads.pause()
-            assert time.monotonic_ns() != MONOTONIC_START_NS + threads.now_ns
-            list(map(str, range(1000)))
-
-    ends = (lambda: None, sys.exit, stay_outside, lambda: threads.outside().__enter__())
-    with virtual_time(seed) as threads:
-        threads.start(threads.wait_until, lambda: look('attempt'))
-        workers = [
-            _thread.start_new_thread(work, (1 + place / 10, end, Kept()))
-            for place, end in enumerate(ends)
-        ]
-        for delay_ns in range(0, 3_000_000_000, 500_000_000):
-            threads.call_at(delay_ns, lambda: look('due'))
-        time.sleep(2)
-        threads.start(work, 1, lambda: time.sleep(1), Kept())
-        threading.Thread(target=_waits_for_ever).start()
-        time.sleep(0.5)
-    looking = {ident for place, ident in clocks if place == 'attempt'}
-    assert looking >= set(workers)
-    assert {place for place, _ident in clocks} == {'attempt', 'due', 'finalizer'}
-    assert all(itertools.chain(*clocks.values()))
 
 
 def test_a_real_clock_is_refused_while_the_next_turn_is_looked_for():

@@ -152,24 +152,6 @@ def test_behaviours_of_other_nodes_run_during_an_on_start_that_waited(check):
     assert check_body(check, 'GO.wait()', f'{nodes}    wait_for: {{topic: go}}\n') == []
 
 
-def test_of_two_who_meet_at_a_barrier_neither_may_wait_for_the_other(check):
-    code = """
-        import threading
-
-        BOTH = threading.Barrier(2)
-
-        def go(node, message):
-            BOTH.wait()
-
-        def tick(node):
-            BOTH.wait()
-    """
-    nodes = SYSTEM.replace('state', 'description').replace(
-        '{ready: false, items: [], event: later}', 'x'
-    )
-    assert check(nodes, code, installed=False) == [(7, 'blocked-group'), (10, 'blocked-group')]
-
-
 @pytest.mark.parametrize('value', ['60', 'null'])
 def test_who_says_that_a_behaviour_may_take_long_is_believed(check, value):
     nodes = SYSTEM.replace('period: 1', f'warn_after: {value}, period: 1')

@@ -46,14 +46,6 @@ def test_a_publisher_that_is_taken_is_used(check, line):
     assert 'unused-publisher' not in [rule for _, rule in found]
 
 
-def test_a_lambda_in_a_loop_uses_each_name(check):
-    system = NODE.replace('    publishers: {', '    publishers: {in: std_msgs/msg/String, ')
-    lines = ('print(node.parameters.speed)', 'for each in ("in", "out"):')
-    code = run(*lines, '    later(lambda: node.publish(each, "hello"), each)')
-    found = check(system, code + '\ndef later(call, name):\n    print(name, call())\n')
-    assert 'unused-publisher' not in [rule for _, rule in found]
-
-
 @pytest.mark.parametrize(
     'line',
     [
@@ -77,26 +69,6 @@ def test_an_abbreviated_name_that_has_a_default_is_a_finding(check):
     assert check(text, code) == [(2, 'missing-parameter')]
     older = "print(node.parameters.get('max_speed', node.parameters.maximum_speed))"
     assert check(text, run(older, "node.publish('out', 'hello')")) == []
-
-
-@pytest.mark.parametrize(
-    'lines',
-    [
-        ('for f in [lambda n=n: node.publish(n, "hi") for n in NAMES]: f()',),
-        ('f = {n: (lambda n=n: node.publish(n, "hi")) for n in NAMES}', 'f[node.state.n]()'),
-        ('for n in NAMES:', '    def f(*, n=n): node.publish(n, "hi")', '    f()'),
-    ],
-)
-def test_a_function_of_each_round_uses_the_name_of_its_own(check, lines):
-    text = """
-  a:
-    state: {n: up}
-    publishers:
-      up: {type: std_msgs/msg/String, external: true}
-      down: {type: std_msgs/msg/String, external: true}
-    on_start: parts:run
-"""
-    assert check(text, 'NAMES = ("up", "down")\n' + run(*lines)) == []
 
 
 @pytest.mark.parametrize(

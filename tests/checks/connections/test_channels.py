@@ -142,26 +142,6 @@ def test_what_ros_has_itself_has_the_types_of_ros(check, section, name, right):
         assert check(text, code, rule=rule, installed=False) == []
 
 
-@pytest.mark.parametrize(
-    ('name', 'type_name'),
-    [
-        ('~/get_parameters', 'rcl_interfaces/srv/GetParameters'),
-        ('/act/_action/cancel_goal', 'action_msgs/srv/CancelGoal'),
-    ],
-)
-def test_what_ros_serves_has_a_server(check, name, type_name):
-    nodes = f"""
-  a:
-    services: {{{name}: {{type: {type_name}, behaviour: parts:serve}}}}
-    actions: {{/act: {{type: test_msgs/action/Fibonacci, behaviour: parts:do}}}}
-"""
-    assert check(nodes, CODE, installed=False) == [(4, 'second-server')]
-    elsewhere = nodes.replace('a:\n', 'a:\n    parameter_services: false\n').replace(
-        'actions: {/act:', 'actions: {/other:'
-    )
-    assert check(elsewhere, CODE, installed=False) == []
-
-
 DEADLINE = """
   a:
     publishers: {out: {type: std_msgs/msg/String, qos: {deadline: 0.5}, external: true}}

@@ -114,18 +114,6 @@ def test_a_wait_on_a_condition_of_the_running_system_never_gets_an_answer(check,
     assert check(more + timer, code, installed=False)[-1:] == [(6, 'service-deadlock')]
 
 
-def test_one_of_several_names_may_be_the_right_one(check):
-    code = """
-        def set_it(node, request): ...
-
-        def tick(node):
-            node.call('set_it' if node.now().nanoseconds % 2 else 'other')
-    """
-    other = '{other: {type: std_srvs/srv/SetBool, external: true}, set_it: std'
-    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n'
-    assert check(ALONE.replace('{set_it: std', other) + timer, code, installed=False) == []
-
-
 ACTION = """
   a:
     action_clients: {count: test_msgs/action/Fibonacci}
@@ -184,23 +172,6 @@ def test_a_goal_may_not_wait_for_what_waits_for_it(check, server, message):
     assert not message or message in found[0]
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize(('group', 'count'), [('', 1), (', group: other', 0)])
-@pytest.mark.parametrize(('timer', 'waits'), [('wait', 1), ('send', 0)])
-def test_a_goal_that_asks_the_group_of_who_waits_for_it_never_ends(
-    check, group, count, timer, waits
-):
-    nodes = (
-        ACTION.replace('parts:do', 'parts:ask')
-        + f"""
-    timers: {{tick: {{period: 1, behaviour: parts:{timer}}}}}
-    service_clients: {{answer: std_srvs/srv/Trigger}}
-    services: {{answer: {{type: std_srvs/srv/Trigger, behaviour: parts:answer{group}}}}}
-"""
-    )
-    assert len(check(nodes, GOALS, rule='service-deadlock')) == count * waits
-
-
 def ring(*names, behaviour='relay', groups=None):
     """Return nodes each of which asks the next to answer."""
     nodes = ''
@@ -244,19 +215,6 @@ def test_two_behaviours_of_one_group_may_ask_each_others_node(check):
     services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
 """
     assert deadlocks(check, nodes) == []
-
-
-def test_a_chain_may_come_back_to_another_service_of_the_group(check):
-    nodes = """
-  a:
-    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: b/set_it}}
-    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
-    timers: {tick: {period: 1, behaviour: parts:ask}}
-  b:
-    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: a/set_it}}
-    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:relay}}
-"""
-    assert deadlocks(check, nodes) == [6]
 
 
 @pytest.mark.parametrize(

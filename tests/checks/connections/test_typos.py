@@ -7,7 +7,6 @@ from textwrap import dedent
 import pytest
 
 from composer.ament import remaps_actions
-from composer.checks.connections import remap_rules
 from composer.checks.connections.typos import find_typo
 
 RULE = 'likely-misspelling'
@@ -112,23 +111,6 @@ processes:
     assert check(nodes.replace('NAME', right), code, installed=False) == []
 
 
-@pytest.mark.parametrize(('remaps', 'is_ignored'), [(False, True), (True, False), (None, False)])
-def test_an_older_ros_does_not_remap_an_action(check, monkeypatch, remaps, is_ignored):
-    monkeypatch.setattr(remap_rules, 'remaps_actions', lambda: remaps)
-    nodes = """
-  server:
-    remap: {do: done, heard: said}
-    actions: {do: {type: test_msgs/action/Fibonacci, behaviour: parts:do}}
-    subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:do}}
-"""
-    code = 'def do(node, it): ...'
-    message = "this ROS remaps no actions, such as '/do', and ignores the rule"
-    rule = 'ignored-remap'
-    assert check(nodes, code, rule=rule, installed=False) == [message] * is_ignored
-    parts = nodes.replace('do: done', 'do/_action/status: x')
-    assert check(parts, code, rule=rule, installed=False) == []
-
-
 @pytest.mark.ros
 def test_the_installed_ros_remaps_actions_as_its_version_says(domain_id):
     code = """
@@ -178,17 +160,6 @@ nodes:
 
 
 @pytest.mark.parametrize(
-    ('group', 'found'), [('reentrnat', True), ('Reentrant', True), ('mine', False)]
-)
-def test_a_group_is_no_misspelt_reentrant(check, group, found):
-    nodes = f"""
-  n:
-    timers: {{tick: {{period: 1, behaviour: parts:tick, group: {group}}}}}
-"""
-    assert check(nodes, 'def tick(node): ...') == ([(4, RULE)] if found else [])
-
-
-@pytest.mark.parametrize(
     ('condition', 'found'),
     [
         ('{topic: a//b}', True),
@@ -212,14 +183,3 @@ processes:
   driver: {command: [true], remap: {a//b: c, d: e f, g: /h}}
 """
     assert check(nodes) == [(5, 'bad-name'), (5, 'bad-name')]
-
-
-def test_a_rule_of_a_node_that_is_left_out_is_checked_as_any_other(check):
-    nodes = """
-  n:
-    when: false
-    remap: {imgae: picture}
-    subscriptions: {image: {type: std_msgs/msg/String, behaviour: b:f}}
-"""
-    message = "node 'n' has nothing called '/imgae', and ROS ignores the rule"
-    assert check(nodes, CODE, rule=RULE, installed=False) == [message]

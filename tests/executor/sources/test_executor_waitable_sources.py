@@ -158,27 +158,6 @@ def test_qos_events_reach_their_callbacks(node: Any, executor: Any) -> None:
         wait_for(lambda: 'matched' in seen)
 
 
-def test_an_action_client_may_be_made_while_its_node_spins(
-    node: Any, executor: Any, monkeypatch
-) -> None:
-    """rclpy 9 gives it a lock when its node knows it already."""
-    get_logger = node.get_logger
-
-    def spin_on() -> Any:
-        for _ in range(3):
-            executor.wake()
-            wait_for(executor.create_task(int).done)
-        return get_logger()
-
-    ActionServer(node, Fibonacci, 'fibonacci', lambda _: Fibonacci.Result())
-    with spinning(executor) as errors:
-        monkeypatch.setattr(node, 'get_logger', spin_on)
-        client = ActionClient(node, Fibonacci, 'fibonacci')
-        assert client.wait_for_server(DEADLINE_SEC)
-        wait_for(client.send_goal_async(Fibonacci.Goal()).done)
-    assert not errors
-
-
 @pytest.mark.parametrize('asynchronous', [False, True])
 def test_actions(node: Any, executor: Any, asynchronous) -> None:
     feedback: list[int] = []
