@@ -54,6 +54,10 @@ def check(path, text):
 def test_what_is_captured_is_checked_beside_nodes_of_a_system(run, tmp_path):
     result = run(['camera', 'viewer'], '-o', 'captured.yaml')
     assert (result.returncode, result.stdout, result.stderr) == (0, '', '')
+    result = run([], 'viewr')
+    assert result.returncode == 1
+    assert "there is no node 'viewr' on this ROS graph (ROS_DOMAIN_ID " in result.stderr
+    assert "did you mean 'viewer'?" in result.stderr
     text = (tmp_path / 'captured.yaml').read_text()
     path = tmp_path / 'robot.yaml'
     assert not check(path, text)
@@ -102,13 +106,6 @@ def test_nodes_of_one_name_and_nodes_that_do_not_answer_are_told_apart(run, tmp_
     assert not check(tmp_path / 'all.yaml', text)
     spec = load_system(tmp_path / 'all.yaml').spec
     assert set(spec.processes) == {'left_camera', 'right_camera', 'silent', 'hung'}
-
-
-def test_a_node_that_is_not_there_is_an_error(run):
-    result = run(['viewer'], 'viewr')
-    assert result.returncode == 1
-    assert "there is no node 'viewr' on this ROS graph (ROS_DOMAIN_ID " in result.stderr
-    assert "did you mean 'viewer'?" in result.stderr
 
 
 def test_no_graph_is_an_error(run):

@@ -43,8 +43,9 @@ KINDS = (
 ARRAYS = {'one': '', 'three': '[3]', 'up_to_four': '[<=4]', 'any': '[]'}
 
 DEFINITIONS = {
-    'msg/Part.msg': 'int32 number\nmore_parts/Wheel[] wheels\n',
-    'msg/Nothing.msg': '# A comment with C:\\users, "quotes" and é.\n',
+    'msg/Part.msg': (
+        '# A comment with C:\\users, "quotes" and é.\nint32 number\nmore_parts/Wheel[] wheels\n'
+    ),
     'msg/Defaults.msg': (
         'bool a true\nbyte b 200\nchar c 66\nfloat32 d -1.5\nint64 e -9223372036854775808\n'
         'uint64 f 18446744073709551615\nstring g "it\'s é"\nwstring h "äö"\nstring<=3 i abc\n'
@@ -56,7 +57,6 @@ DEFINITIONS = {
         'uint64 F=18446744073709551615\nstring G="it\'s é"\nint8 H=0x10\nstring I=\n'
     ),
     'srv/Nothing.srv': '---\n',
-    'action/Nothing.action': '---\n---\n',
 }
 # Takes as long to compile as all others here.
 EVERY_KIND = {
@@ -315,28 +315,6 @@ def build_into(
     folder.mkdir()
     definitions = load_definitions(folder.name, write(files))
     build_package(definitions, folder, Dependencies(ament_prefixes(), built))
-
-
-def test_a_built_package_can_be_moved(
-    run_python: RunPython,
-    write_definitions: WriteDefinitions,
-    tmp_path: Path,
-) -> None:
-    one, two = tmp_path / 'moved_one', tmp_path / 'moved_two'
-    build_into(one, write_definitions, {'msg/One.msg': 'int32 a\n'})
-    build_into(two, write_definitions, {'msg/Two.msg': 'moved_one/One one\n'}, moved_one=one)
-    elsewhere = tmp_path / 'elsewhere'
-    elsewhere.mkdir()
-    for prefix in (one, two):
-        prefix.rename(elsewhere / prefix.name)
-    code = (
-        'import sys; sys.path += sys.argv[1:]\n'
-        'from moved_two.msg import Two; from rclpy.serialization import *\n'
-        'message = Two(); message.one.a = 3\n'
-        'print(deserialize_message(serialize_message(message), Two))'
-    )
-    run = run_python(code, *(elsewhere / path.name / 'python' for path in (one, two)))
-    assert run.stdout == 'moved_two.msg.Two(one=moved_one.msg.One(a=3))\n', run.stderr
 
 
 def test_a_package_that_is_used_and_not_installed_is_an_error(tmp_path: Path) -> None:
