@@ -131,11 +131,6 @@ def test_what_others_write_is_left_alone(tmp_path, text):
     assert not looks_like_system(path)
 
 
-def test_a_name_that_is_too_long_is_a_missing_file():
-    assert select('a' * 5000) == (['a' * 5000], [])
-    assert select('a' * 5000, skip_other_files=True) == (['a' * 5000], [])
-
-
 def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):
     tree(one_yaml=SYSTEM)
     os.mkfifo(tmp_path / 'pipe.yaml')

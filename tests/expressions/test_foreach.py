@@ -179,43 +179,10 @@ nodes:
     ]
 
 
-def test_an_entry_is_read_once_where_its_foreach_has_no_list():
-    system = load(
-        """
-nodes:
-  "wheel_{{ i }}":
-    foreach: {i: 3}
-    log_level: "{{ loudness }}"
-    state: {index: "{{ i }}"}
-    colour: red
-"""
-    )
-    assert [each.rule for each in system.diagnostics] == [
-        'bad-foreach',
-        'undefined-name',
-        'unknown-key',
-    ]
-
-
 @pytest.mark.parametrize('limit', ['-1', '0'])
 def test_a_limit_that_is_none_limits_nothing(limit):
     system = load(f'max_nodes: {limit}\nnodes:\n  "a_{{{{ i }}}}": {{foreach: {{i: [1, 2]}}}}\n')
     assert [each.rule for each in system.diagnostics] == ['out-of-range']
-
-
-@pytest.mark.parametrize('type_name', ['intger', '[a]', 'text'])
-def test_an_argument_with_a_misspelt_type_has_its_default(type_name):
-    system = load(
-        f"""
-args: {{count: {{type: {type_name}, default: 2}}}}
-nodes:
-  "wheel_{{{{ i }}}}":
-    foreach: {{i: "{{{{ range(count) }}}}"}}
-    warn_after: "{{{{ -count }}}}"
-"""
-    )
-    assert [each.rule for each in system.diagnostics][1:] == ['out-of-range', 'out-of-range']
-    assert names(system) == ['wheel_0', 'wheel_1']
 
 
 # A value of each kind of entity, repeated and left out.

@@ -275,14 +275,6 @@ def test_a_missing_module_says_which_part_and_what_is_near(tmp_path):
     assert finder.find('zzqqxx.yy') == MissingModule('zzqqxx', None)
 
 
-def test_names_that_no_file_can_have_are_missing(tmp_path):
-    name = 'a' * 300
-    make(tmp_path, 'package/inner.py')
-    finder = ModuleFinder([tmp_path])
-    assert finder.find(name) == MissingModule(name, None)
-    assert finder.find(f'package.{name}') == MissingModule(f'package.{name}', None)
-
-
 def test_a_project_reaches_up_to_its_mark(tmp_path, monkeypatch):
     monkeypatch.chdir('/')
     folder = tmp_path / 'project' / 'systems' / 'deep'
@@ -302,17 +294,6 @@ def test_the_folder_of_the_command_comes_first(tmp_path, monkeypatch):
     path = project_search_path([tmp_path / 'there' / 'a.yaml'])
     assert path == [tmp_path / 'here', tmp_path / 'there']
     assert ModuleFinder(path).find('f').path == tmp_path / 'here' / 'f.py'
-
-
-def test_a_module_of_ten_thousand_lines_is_read(tmp_path):
-    path = tmp_path / 'module.py'
-    function = (
-        'def f{}(node, message):\n    if message.data > 0:\n        node.publish("x", a=1)\n\n'
-    )
-    path.write_text(''.join(map(function.format, range(2500))))
-    source = read_module(path)
-    assert source.unread is None
-    assert len(source.functions) == 2500
 
 
 def test_modules_are_read_until_they_are_too_many(tmp_path):

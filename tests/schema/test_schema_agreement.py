@@ -237,7 +237,7 @@ def test_names_of_white_space_are_empty(validator, name):
 
 
 def test_findings_are_the_same_without_jsonschema_rs(monkeypatch):
-    files = sorted(Path(composer.__file__).parent.glob('rules/*/bad.yaml'))
+    files = sorted(Path(composer.__file__).parent.glob('rules/*/bad.yaml'))[::3]
 
     def find_all():
         structure._schema.cache_clear()

@@ -293,14 +293,6 @@ def test_a_misspelt_key_is_read_as_the_right_one():
     assert loaded.dropped == frozenset()
 
 
-def test_a_misspelt_key_beside_the_right_one_is_reported_and_left_out():
-    loaded = load_system_text(HEAD + 'nodes: {rover: {timers: {}, timer: {a: 3}}}')
-    assert [(f.rule, f.help) for f in loaded.diagnostics] == [
-        ('unknown-key', "did you mean 'timers'?")
-    ]
-    assert ('nodes', 'rover', 'timer') in loaded.dropped
-
-
 def test_what_is_wrong_is_left_out_and_the_rest_is_read():
     loaded = load_system_text(
         HEAD + 'description: [a]\n'
@@ -320,15 +312,6 @@ def test_what_is_wrong_is_left_out_and_the_rest_is_read():
         ('nodes', 'rover', 'publishers', 'bad'),
         ('nodes', 'lander'),
     }
-
-
-def test_all_findings_are_found_in_one_run():
-    text = (
-        HEAD
-        + 'nodes:\n'
-        + ''.join(f'  n{i}: {{log_level: {i}, tmers: {{}}}}\n' for i in range(50))
-    )
-    assert len(findings(text)) == 100
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from composer.stubs.checking.kept_types import TypesCheck
 
 DATA = Path(__file__).resolve().parent.parent / 'data'
 TYPED = DATA / 'typed'
-VALID = sorted((DATA / 'valid' / 'robots').glob('*.yaml'))
+VALID = sorted((DATA / 'valid' / 'robots').glob('*.yaml'))[::2]
 
 pytestmark = [
     pytest.mark.ros,
