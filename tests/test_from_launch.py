@@ -59,13 +59,9 @@ def read_examples():
 EXAMPLES = read_examples()
 # The last example of each of these does more, as it runs, than start programs.
 RUN = (
-    'Values from commands and files',
-    'Includes with arguments',
     'Programs, respawn, shutdown',
     'Event handlers and timers',
     'Composable nodes',
-    'Lifecycle nodes',
-    'What nodes do in code',
 )
 
 
