@@ -124,14 +124,10 @@ SABOTAGE = """
 import ctypes
 import sys
 import threading
-import time
 from pathlib import Path
 
 def say(node):
     node.logger.info('stopping')
-
-def fail(*_):
-    raise ValueError('sabotage')
 
 def refuse(thread):
     raise RuntimeError("can't start new thread")
@@ -139,13 +135,6 @@ def refuse(thread):
 def close_output():
     sys.stdout.close()
     sys.stderr.close()
-
-def stop_clocks():
-    time.monotonic = time.monotonic_ns = time.time = lambda: 0
-    time.sleep = fail
-
-def trace():
-    threading.settrace(fail)
 
 def refuse_threads():
     threading.Thread.start = refuse
@@ -165,8 +154,6 @@ def harm(node, how):
     ('how', 'exit_code'),
     [
         ('close_output', 0),
-        ('stop_clocks', 0),
-        ('trace', 0),
         ('refuse_threads', 0),
         ('throw_into_main', 3),
     ],

@@ -87,16 +87,8 @@ def test_of_two_that_start_together_one_comes_up(compose):
     assert other.stop() == 0
 
 
-@pytest.mark.parametrize('is_a_system', [True, False])
-def test_a_node_whose_name_is_on_the_graph_already_is_a_warning(compose, peer, is_a_system):
-    if is_a_system:
-        compose(SYSTEM, CODE).wait_until_ready()
-        path = compose.write(SYSTEM, CODE, name='other')
-        child = compose.run(path.name)
-        name = '/lonely'
-    else:
-        child = compose(SYSTEM.replace('lonely', 'peer'), CODE)
-        name = '/peer'
-    child.wait_for_line(f"a node '{name}' runs already on this ROS graph")
+def test_a_node_whose_name_is_on_the_graph_already_is_a_warning(compose, peer):
+    child = compose(SYSTEM.replace('lonely', 'peer'), CODE)
+    child.wait_for_line("a node '/peer' runs already on this ROS graph")
     assert child.stop() == 0
     assert len(child.matching('runs already')) == 1
