@@ -116,7 +116,8 @@ class _Classes:
             taken = name in self._names.values()
             self._names[shape] = f'{name}_{len(self._names)}' if taken else name
         nodes = self.nodes_by_name.setdefault(self._names[shape], [])
-        nodes += [node for node in self.nodes if node.key in several and node not in nodes]
+        missing = {*several}.difference(node.key for node in nodes)
+        nodes += [node for node in self.nodes if node.key in missing] if missing else ()
         return f'{SUPPORT}.{self.module}', self._names[shape]
 
     def shapes_by_name(self) -> dict[str, NodeShape]:
