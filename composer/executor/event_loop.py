@@ -194,6 +194,8 @@ class EventLoop:
             workers.put_off(now)
         if work.slow:
             workers.hand_over(me)
+            # That it waited makes it no slow one again.
+            me.busy_since = monotonic()
         if me.session is not None and workers.is_alone():
             self._notify()  # Nobody will take over.
         runner = self._runner

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 _LOOK_SEC: Final = 1.0
 _STOP_SEC: Final = 2.0
-_BURST_SEC: Final = 0.02
+_BURST_SEC: Final = 0.03
 _ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 import threading
-from collections import deque
+from collections import Counter, deque
 from contextlib import suppress
 from time import monotonic, thread_time, time_ns
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -56,8 +56,8 @@ class OwnPublishers(Protocol):
 
     may_be_late: bool
 
-    def count(self, topic: str) -> int:
-        """Return how many of them a topic has."""
+    def count(self) -> Counter[str]:
+        """Return how many of them each topic has."""
 
     def has(self, publisher: bytes) -> bool:
         """Return whether a publisher is one of them; see `SerializedMessage`."""
@@ -75,10 +75,10 @@ class OwnPublishers(Protocol):
 class _NoPublishers:
     may_be_late = False
 
-    def count(self, topic: str) -> int:  # noqa: ARG002 - as in `OwnPublishers`
-        return 0
+    def count(self) -> Counter[str]:
+        return Counter()
 
-    def has(self, publisher: bytes) -> bool:  # noqa: ARG002 - the same
+    def has(self, publisher: bytes) -> bool:  # noqa: ARG002 - as in `OwnPublishers`
         return False
 
     def adopt(self, node: RosNode, subscription: RosSubscription) -> None:
@@ -198,32 +198,33 @@ class GraphRecorder:
         """Subscribe to the topics that have come; return when to look again, in seconds."""
         begun = thread_time()
         self._drop_forgotten()
-        found = list(self._find_new())
-        self._tell_unmatched()
+        own = self._own.count()
+        found = list(self._find_new(own))
+        self._tell_unmatched(own)
         pause_sec = _PAUSE_FACTOR * (thread_time() - begun)
         for topic, type_name in found:
             self._subscribe(topic, type_name)
         return min(max(pause_sec, _SHORTEST_PAUSE_SEC), _LONGEST_PAUSE_SEC)
 
-    def _find_new(self) -> Iterator[tuple[str, str]]:
+    def _find_new(self, own: Counter[str]) -> Iterator[tuple[str, str]]:
         """Yield the topics and types that others publish, and nobody listens to here."""
         for topic, types in self._node.get_topic_names_and_types():
             self.topics.add(topic)
             if not self._patterns.has(topic):
                 continue
             new = [each for each in types if (topic, each) not in self._heard]
-            if not new or self._node.count_publishers(topic) <= self._own.count(topic):
+            if not new or self._node.count_publishers(topic) <= own[topic]:
                 self._suspected.discard(topic)
             elif self._own.may_be_late and topic not in self._suspected:
                 self._suspected.add(topic)
             else:
                 yield from ((topic, each) for each in new)
 
-    def _tell_unmatched(self) -> None:
+    def _tell_unmatched(self, own: Counter[str]) -> None:
         """Tell of publishers that have come since, and offer less than is asked for."""
         for listener in self._listeners.values():
             topic, before = listener.channel.topic, listener.publishers
-            if self._node.count_publishers(topic) - self._own.count(topic) <= before:
+            if self._node.count_publishers(topic) - own[topic] <= before:
                 continue
             ends = self._find_publishers(topic, interface_name(listener.ros.msg_type))
             listener.publishers = max(before, len(ends))

@@ -21,6 +21,7 @@ from composer.runtime.messages.local_delivery import is_latched
 from composer.runtime.middleware.ros_graph import create_graph_node
 
 if TYPE_CHECKING:
+    from collections import Counter
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
@@ -169,8 +170,8 @@ class _OwnPublishers:
         self.publishers: set[bytes] = set()
         self._listeners: dict[RosSubscription, LocalSubscription] = {}
 
-    def count(self, topic: str) -> int:
-        return self._topics.count_publishers(topic, leaves_latched=self._leaves_latched)
+    def count(self) -> Counter[str]:
+        return self._topics.count_publishers(leaves_latched=self._leaves_latched)
 
     def has(self, publisher: bytes) -> bool:
         return publisher in self.publishers

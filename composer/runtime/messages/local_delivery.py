@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections import defaultdict
+from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from rclpy.duration import Duration
@@ -383,18 +383,18 @@ class LocalTopics:
             topic.connect()
         return subscription
 
-    def count_publishers(self, name: str, *, leaves_latched: bool = False) -> int:
-        """Return how many publishers a topic has in this system, of any type.
+    def count_publishers(self, *, leaves_latched: bool = False) -> Counter[str]:
+        """Return how many publishers each topic has in this system, of any type.
 
         Args:
             leaves_latched: Whether those are left out whose messages late subscriptions get.
         """
         with self._lock:
-            return sum(
-                not (leaves_latched and is_latched(publisher.ros))
-                for (each, _), topic in self._topics.items()
-                if each == name
+            return Counter(
+                name
+                for (name, _), topic in self._topics.items()
                 for publisher in topic.publishers
+                if not (leaves_latched and is_latched(publisher.ros))
             )
 
     def change_subscription(self, subscription: LocalSubscription, *, read_only: bool) -> None:
