@@ -45,9 +45,10 @@ def _run_in_child(folder, output, words, more):
     signal.signal(signal.SIGXCPU, signal.SIG_DFL)
     signal.alarm(LIMIT_SEC * 4)
     resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_SEC, LIMIT_SEC))
-    pages = int(Path('/proc/self/statm').read_text().split()[0])
+    # Of what can be written: an allocator reserves addresses for each thread.
+    pages = int(Path('/proc/self/statm').read_text().split()[5])
     memory = pages * resource.getpagesize() + more
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     code = run(list(words))
     sys.stdout.flush()
     sys.stderr.flush()
