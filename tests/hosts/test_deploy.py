@@ -1,7 +1,5 @@
 """A system is deployed to two hosts, changed, and removed again."""
 
-import time
-
 import pytest
 
 from tests.host_bed import why_there_is_none
@@ -14,19 +12,14 @@ pytestmark = [
     pytest.mark.skipif(bool(why_there_is_none()), reason=why_there_is_none()),
 ]
 TALK = f'{ROOT_THERE}/live/files/behaviours/talk.py'
-MOST_SEC = 12.0
 
 
 @pytest.mark.long
-def test_a_system_is_deployed_planned_and_edited(bed, tmp_path):
+def test_a_system_is_deployed_edited_and_removed(bed, tmp_path):
     project = Project(bed, tmp_path / 'duo')
     project.ensure()
     project.hears('hello')
-
-    begun = time.monotonic()
     done = project.deploy()
-    # Of a machine that does nothing else.
-    assert time.monotonic() - begun < 3 * MOST_SEC
     assert done.stderr == 'front: nothing to do\nrear: nothing to do\nrobot: nothing to do\n'
 
     before, pids = project.states(), project.pids()
@@ -43,27 +36,20 @@ def test_a_system_is_deployed_planned_and_edited(bed, tmp_path):
     project.hears('good day')
     assert project.pids() == pids
 
-
-@pytest.mark.long
-def test_what_somebody_edits_there_is_not_overwritten_unless_it_is_the_same_here(project):
-    before, pids = project.states(), project.pids()
+    # What somebody edits there is not overwritten.
+    before = project.states()
     project.front.run('sed', '-i', '1i # mine', TALK)
-    project.edit('behaviours/talk.py', 'hello', 'good day')
+    project.edit('behaviours/talk.py', 'good day', 'good night')
     assert f'{TALK} was edited there' in ' '.join(project.deploy(code=1).stdout.split())
     assert project.states() == before
-    (project.folder / 'behaviours/talk.py').write_text(project.front.run('cat', TALK).stdout)
-    project.deploy()
-    assert project.pids() == pids
+    project.front.run('sed', '-i', '1d', TALK)
 
-
-@pytest.mark.long
-def test_what_is_removed_leaves_nothing_but_what_others_wrote(project):
-    # Nothing is to run on the rear any more.
+    # Nothing is to run on the rear any more: nothing is left there but what others wrote.
     project.edit('robot.yaml', 'host: rear', 'host: front')
     project.rear.run('sed', '-i', '1i # mine', TALK)
     project.rear.run('touch', f'{ROOT_THERE}/map')
     assert project.deploy().stderr.endswith('robot: 2 hosts changed\n')
-    wait_for(lambda: project.front.run('cat', 'heard').stdout == 'hello', 'the listener')
+    wait_for(lambda: project.front.run('cat', 'heard').stdout == 'good night', 'the listener')
     assert project.state('rear')[0] == ('inactive', '', '', False)
     assert project.rear.run('find', FOLDER, '-type', 'f').stdout.split() == [
         f'{FOLDER}/edited/robot/files/behaviours/talk.py',
@@ -73,6 +59,3 @@ def test_what_is_removed_leaves_nothing_but_what_others_wrote(project):
     assert project.front.run('ls', FOLDER).returncode
     for host in (project.front, project.rear):
         assert not host.run('find', UNITS, '-name', '*composer*').stdout
-    project.rear.run('rm', '-r', FOLDER)
-    done = project.deploy('--remove')
-    assert done.stderr == 'front: nothing to do\nrear: nothing to do\nrobot: nothing to do\n'
