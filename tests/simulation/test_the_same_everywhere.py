@@ -120,14 +120,13 @@ def check_that_they_are_the_same(here, there, words, *options):
     there.mkdir()
     shutil.copytree(here, there / 'copy')
     (there / 'copy' / 'DEFAULT_FASTDDS_PROFILES.xml').write_text(PROFILE)
-    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
+    busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
     try:
         first = traced(here, words, *options)
         second = traced(there / 'copy', words, *options, '-s')
     finally:
-        for each in busy:
-            each.kill()
-            each.wait()
+        busy.kill()
+        busy.wait()
     # The first line that differs says more than a thousand of them.
     pairs = zip(first, second, strict=False)
     assert next((pair for pair in pairs if pair[0] != pair[1]), None) is None
@@ -154,6 +153,6 @@ def test_shipped_systems_are_the_same(tmp_path, interface_cache):
     here.mkdir()
     for name in ('behaviours', 'configs', 'interfaces', 'tests/systems'):
         shutil.copytree(ROOT / name, here / name)
-    names = ('cell', 'managed', 'patrol', 'robot', 'warehouse')
+    names = ('cell', 'patrol', 'warehouse')
     words = [f'tests/systems/{name}.scenario.yaml' for name in names]
     check_that_they_are_the_same(here, tmp_path / 'there', words)

@@ -21,7 +21,7 @@ from tests.runtime.rewiring.schema_keys import read_schema_keys
 pytestmark = pytest.mark.ros
 
 
-@pytest.mark.parametrize(('seed', 'edits'), [(1, 5), pytest.param(2, 30, marks=pytest.mark.long)])
+@pytest.mark.parametrize(('seed', 'edits'), [(1, 5), pytest.param(2, 15, marks=pytest.mark.long)])
 def test_edits(seed, edits, tmp_path, domain_id, other_domain_id):
     with playing(tmp_path, seed, (domain_id, other_domain_id)) as game:
         for _ in range(edits):
