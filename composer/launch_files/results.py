@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from composer.launch_files.surroundings import Wait
     from composer.launch_files.texts import Text
 
+# Files have the time of the kernel's last tick, which may be so long ago.
+_TICK_SEC = 0.01
 # A constant in an expression, and not the name in `args['name']`.
 _CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
 
@@ -130,7 +132,7 @@ class Imported:
     def is_new_file(self, path: str) -> bool:
         """Return whether a helper of the launch file has written a file just now."""
         try:
-            is_new = Path(path).stat().st_mtime >= self.started
+            is_new = Path(path).stat().st_mtime > self.started - _TICK_SEC
         except (OSError, ValueError):
             return False
         return is_new and path.startswith(f'{tempfile.gettempdir()}/') and os.path.isfile(path)
