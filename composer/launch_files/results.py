@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from composer.launch_files.surroundings import Wait
     from composer.launch_files.texts import Text
 
-# Files have the time of the kernel's last tick, which may be so long ago.
-_TICK_SEC = 0.01
+_POLL_SEC = 0.001
 # A constant in an expression, and not the name in `args['name']`.
 _CONSTANT = re.compile(r"""(?<!args\[)('[^']*'|"[^"]*")""")
 
@@ -47,6 +46,19 @@ class Origin(str):
 
 class LaunchError(ComposerError):
     """A launch file cannot be read."""
+
+
+def _wait_for_tick() -> int:
+    """Return the newest time of files, in ns; those that are written from now on have a later one.
+
+    Files have the time of the kernel's last tick, which comes every few milliseconds.
+    """
+    with tempfile.TemporaryFile(buffering=0) as file:
+        begun_ns = os.fstat(file.fileno()).st_mtime_ns
+        while os.fstat(file.fileno()).st_mtime_ns <= begun_ns:
+            time.sleep(_POLL_SEC)
+            file.write(b'\n')
+    return begun_ns
 
 
 @dataclass
@@ -95,7 +107,7 @@ class Imported:
 
     Attributes:
         given: The values of arguments that the import was given.
-        started: When the import began, in seconds: files of before are not written by it.
+        started_ns: When the import began: files of before are not written by it.
     """
 
     arguments: dict[str, Argument] = field(default_factory=dict)
@@ -103,7 +115,7 @@ class Imported:
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     given: Mapping[str, str] = field(default_factory=dict)
-    started: float = field(default_factory=time.time)
+    started_ns: int = field(default_factory=_wait_for_tick)
 
     def freeze(self, *used: Text | str) -> list[Argument]:
         """Keep the arguments in texts and expressions as they are, and return them.
@@ -132,7 +144,7 @@ class Imported:
     def is_new_file(self, path: str) -> bool:
         """Return whether a helper of the launch file has written a file just now."""
         try:
-            is_new = Path(path).stat().st_mtime > self.started - _TICK_SEC
+            is_new = Path(path).stat().st_mtime_ns > self.started_ns
         except (OSError, ValueError):
             return False
         return is_new and path.startswith(f'{tempfile.gettempdir()}/') and os.path.isfile(path)

@@ -1,7 +1,6 @@
 """Launch descriptions → systems, with stand-ins for the objects of `launch`."""
 
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -401,8 +400,6 @@ def test_a_file_that_launch_code_writes_is_copied_beside_the_system(tmp_path):
 
     def write(context):
         written.write_text(f'side: {context.launch_configurations["side"]}\n')
-        # The time of a file is that of the kernel's last tick.
-        os.utime(written, (time.time() - 0.009,) * 2)
         return [node(arguments=['-d', str(written), SIM])]
 
     system = read(launch.OpaqueFunction(write))
