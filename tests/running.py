@@ -25,6 +25,9 @@ PATIENCE_SEC = 8.0
 _FIRST_DOMAIN, _DOMAINS = 10, 91
 # Threads of behaviours have the names that Python gives them.
 _DEAD = re.compile(r'Exception in thread (?!Thread-\d+ \((?!_))')
+# Fast DDS prints this of ports of shared memory, which processes of all domains have in common:
+# when another one holds the lock of a port that is gone.
+_OF_OTHERS = 'RTPS_TRANSPORT_SHM'
 _domain_offsets = count(os.getpid() * 7)
 _peers = []
 
@@ -47,6 +50,11 @@ def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
         time.sleep(min(max(_PAUSE_SEC, 3 * (time.monotonic() - looked)), 5 * _PAUSE_SEC))
         looked = time.monotonic()
     return result
+
+
+def read_line(stream):
+    """Return the next line of a program that is its own, or '' at its end."""
+    return next(line for line in iter(stream.readline, None) if _OF_OTHERS not in line)
 
 
 def descendants(pid):
@@ -191,7 +199,7 @@ class Child:
         self._process.stdout.close()
 
     def _read(self):
-        for line in self._process.stdout:
+        while line := read_line(self._process.stdout):
             with self._grown:
                 self.lines.append(line.rstrip('\n'))
                 self._up = self._up or ' ready in ' in line

@@ -15,7 +15,7 @@ from rclpy.action import ActionClient
 from rclpy.qos import QoSProfile
 from test_msgs.action import Fibonacci
 
-from tests.running import DEADLINE_SEC, wait_for
+from tests.running import DEADLINE_SEC, read_line, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -476,7 +476,7 @@ def test_a_client_killed_in_mid_goal_leaves_the_server_sound(
 ):
     environment = os.environ | {'ROS_DOMAIN_ID': str(shared_compose.domain_id)}
     doomed = start_program('-c', CLIENT_CODE, env=environment)
-    assert doomed.stdout.readline() == 'heard\n'
+    assert read_line(doomed.stdout) == 'heard\n'
     doomed.kill()
     client = connect('doomed')
 

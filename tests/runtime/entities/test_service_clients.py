@@ -7,6 +7,8 @@ pytest.importorskip('test_msgs')
 
 from std_srvs.srv import Trigger
 
+from tests.running import read_line
+
 pytestmark = pytest.mark.ros
 
 CODE = """
@@ -129,6 +131,8 @@ import time
 import rclpy
 from std_srvs.srv import Trigger
 
+from tests.running import read_line
+
 def answer(request, response):
     if sys.argv[1] == 'hang':
         print('asked', flush=True)
@@ -150,7 +154,7 @@ def plain_server(domain_id, start_program):
 
     def start(how):
         process = start_program('-c', PEER_CODE, how)
-        assert process.stdout.readline() == 'up\n'
+        assert read_line(process.stdout) == 'up\n'
         return process
 
     return start
@@ -302,7 +306,7 @@ def test_a_server_killed_in_mid_call_is_a_timeout(compose, plain_server):
     client = """wait_for: {service: ask}
             timers: {tick: {period: 0.02, behaviour: 'parts:ask_and_tell', with: {timeout: 2.0}}}"""
     child = compose(asking(client), CODE)
-    assert server.stdout.readline() == 'asked\n'
+    assert read_line(server.stdout) == 'asked\n'
     server.kill()
 
     line = child.wait_for_line("CallTimeoutError: '/ask'")
@@ -354,7 +358,7 @@ def test_a_signal_ends_behaviours_that_wait_for_a_response(compose, plain_server
     child = compose(asking(client), CODE)
     child.wait_for_line('asking', times=2 if client is TIMERS else 1)
     if server == 'hang':
-        assert plain.stdout.readline() == 'asked\n'
+        assert read_line(plain.stdout) == 'asked\n'
 
     up = client is TIMERS
     assert child.stop(once_up=up) == (0 if up else 130)

@@ -8,7 +8,7 @@ import sys
 import threading
 from time import monotonic, sleep
 
-from tests.running import DEADLINE_SEC, ROOT
+from tests.running import DEADLINE_SEC, ROOT, read_line
 
 _POLL_SEC = 0.002
 _MOST_AT_ONCE = 20
@@ -64,7 +64,7 @@ class Outsider:
     def _do(self, *command):
         self._process.stdin.write(json.dumps(command) + '\n')
         self._process.stdin.flush()
-        return json.loads(self._process.stdout.readline())
+        return json.loads(read_line(self._process.stdout))
 
 
 class _Ends:
