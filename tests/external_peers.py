@@ -18,7 +18,7 @@ from composer.interfaces.build.provision import import_packages, provide_package
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
 
-DEADLINE_SEC = 40.0
+DEADLINE_SEC = 90.0
 FOLDER = Path(__file__).resolve().parent.parent / 'interfaces'
 PACKAGES = ('example_interfaces', 'action_tutorials_interfaces')
 

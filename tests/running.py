@@ -18,7 +18,7 @@ import pytest
 from tests.fork_server import start_composer
 
 ROOT = Path(__file__).resolve().parent.parent
-DEADLINE_SEC = 40.0
+DEADLINE_SEC = 90.0
 PATIENCE_SEC = 8.0
 
 # Domains of DDS whose ports lie below the range that Linux gives to outgoing connections.

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import os
 import select
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from composer.application.running_systems.client import STATUS_SEC, Client, wait_until
+from composer.application.running_systems.client import (
+    STATUS_SEC,
+    Client,
+    EndedError,
+    wait_until,
+)
 from composer.application.running_systems.discovery import Discovery
 from composer.errors import ComposerError, UsageError
 from composer.runtime.control import protocol
@@ -86,7 +92,8 @@ def _stop(client: Client, discovery: Discovery, system: RunningSystem, timeout_s
     pid = discovery.find_process(system)
     process = None if pid is None else _open_process(pid)
     try:
-        client.ask(system, protocol.DOWN, STATUS_SEC)
+        with suppress(EndedError):
+            client.ask(system, protocol.DOWN, STATUS_SEC)
         if process is None:
             return wait_until(lambda: not discovery.is_there(system), timeout_sec)
         return bool(select.select([process], [], [], timeout_sec)[0])

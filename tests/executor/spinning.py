@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sized
 from contextlib import contextmanager
 from typing import Any
 
-DEADLINE_SEC = 40.0
+DEADLINE_SEC = 90.0
 QUIET_SEC = 0.2
 
 

@@ -552,7 +552,8 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
         shared_peer.node.create_publisher, String, '/left/words', qos_profile_sensor_data
     )
     wait_for(lambda: find('main svg .external.node'), 'the publisher in the graph')
-    assert text_of('#message button') == 'Pause'
+    # Messages are looked at still; of a topic that seems slow, one at a time.
+    assert text_of('#message button') in {'Pause', 'Go on'}
     for place in ('#live .outside', '#tree .outside'):
         wait_for(lambda place=place: name in text_of(place), place)
     assert outside() == {'/left/words': [('publisher', name)]}

@@ -20,7 +20,7 @@ from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
-DEADLINE_SEC = 40.0
+DEADLINE_SEC = 90.0
 
 
 @pytest.fixture

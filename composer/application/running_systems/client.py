@@ -32,6 +32,10 @@ _ASK_AGAIN_SEC = 1.0
 STATUS_SEC = 5.0
 
 
+class EndedError(ComposerError):
+    """A system ended before it answered."""
+
+
 @record
 class RunningSystem:
     """A system that was found.
@@ -184,7 +188,7 @@ class Client:
                 break
             if not client.service_is_ready():
                 message = f"system '{system.name}' ended before it answered"
-                raise ComposerError(message)
+                raise EndedError(message)
             if time.monotonic() > deadline:
                 message = f"system '{system.name}' did not answer within {timeout_sec:g} s"
                 raise ComposerError(message, help='it may do it yet')

@@ -9,6 +9,9 @@ import threading
 from time import monotonic, monotonic_ns
 from typing import TYPE_CHECKING, Any, Protocol
 
+from rclpy.exceptions import InvalidHandle
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
 from composer.records import record
 from composer.runtime.costs.call_meter import call_meter
 from composer.runtime.costs.process_costs import ProcessMeter
@@ -125,6 +128,14 @@ class DiagnosticsPublisher:
         self._watched_until = monotonic() + _WATCHED_SEC
 
     def _run(self) -> None:
+        try:
+            self._publish_on()
+        except (InvalidHandle, _rclpy.RCLError):
+            # A behaviour may have shut ROS down: the system ends then.
+            if self._node.context.ok():
+                raise
+
+    def _publish_on(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
 
         from composer.runtime.health.diagnostic_status import (

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.application.ask import restart
-from composer.application.running_systems.client import Client
+from composer.application.ask import down, restart
+from composer.application.running_systems.client import Client, EndedError
 from composer.application.running_systems.discovery import Discovery
 from composer.errors import ComposerError
 from composer.runtime.control import protocol
@@ -60,3 +60,17 @@ def test_a_system_that_does_not_answer_may_have_the_node(peer):
         str(error.value)
         == "no system that answers has a node or process 'stuck', and 'arm' does not answer"
     )
+
+
+def test_a_system_that_ends_before_it_answers_is_down(compose, monkeypatch):
+    child = compose('version: 1\nnodes: {only: {}}\n')
+    child.wait_until_ready()
+    ask = Client.ask
+
+    def ask_in_vain(client, system, *arguments):
+        ask(client, system, *arguments)
+        raise EndedError(system.name)
+
+    monkeypatch.setattr(Client, 'ask', ask_in_vain)
+    assert down() == 'system'
+    assert child.wait() == 0

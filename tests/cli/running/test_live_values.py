@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from tests.running import wait_for
+from tests.running import DEADLINE_SEC, wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -60,7 +60,7 @@ def run(shared_compose):
 
     def run(*words):
         with run.begin(*words) as child:
-            out, err = child.communicate(timeout=50)
+            out, err = child.communicate(timeout=DEADLINE_SEC)
         return child.returncode, out, err
 
     run.begin = partial(begin, shared_compose.domain_id)
@@ -131,7 +131,7 @@ def test_an_interrupt_ends_it(run, words, line, code):
     with run.begin(*words) as child:
         assert any(line in each for each in child.stdout)
         child.send_signal(signal.SIGINT)
-        _, err = child.communicate(timeout=40)
+        _, err = child.communicate(timeout=DEADLINE_SEC)
     assert child.returncode == code
     assert err == ('canceling the goal\nthe goal was canceled\n' if code else '')
 
