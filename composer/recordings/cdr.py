@@ -20,6 +20,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from composer.errors import ComposerError
 from composer.interfaces.class_fields import describe_class
 from composer.interfaces.classes import import_interface
+from composer.runtime.messages.arrays import TYPE_CODES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -31,24 +32,8 @@ if TYPE_CHECKING:
 
 _HEADER: Final = b'\0\1\0\0'
 _LARGEST: Final = 8
-# As `struct` names what it packs.
-_CODES: Final = {
-    'bool': '?',
-    'byte': 'c',
-    'char': 'B',
-    'int8': 'b',
-    'uint8': 'B',
-    'int16': 'h',
-    'uint16': 'H',
-    'int32': 'i',
-    'uint32': 'I',
-    'int64': 'q',
-    'uint64': 'Q',
-    'float32': 'f',
-    'float64': 'd',
-}
-# Arrays of these are lists.
-_LISTED: Final = frozenset({'bool', 'byte'})
+# As `struct` names what it packs. Arrays of those that `array` has not are lists.
+_CODES: Final = {**TYPE_CODES, 'bool': '?', 'byte': 'c'}
 
 
 class _OtherwiseError(Exception):
@@ -114,10 +99,10 @@ def _writer_of(type_: FieldType) -> _Write:
     kind, is_fixed = type_.kind, type_.array == 'fixed'
     if kind == 'string' and type_.array is None:
         return _write_text
-    if kind in _LISTED:
-        write = _listed(_CODES[kind])
+    if kind in TYPE_CODES:
+        write = _array(struct.calcsize(f'={TYPE_CODES[kind]}'))
     elif kind in _CODES:
-        write = _array(struct.calcsize(f'={_CODES[kind]}'))
+        write = _listed(_CODES[kind])
     else:
         raise _OtherwiseError
 

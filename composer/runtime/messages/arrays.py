@@ -21,8 +21,8 @@ from composer.interfaces.field_values import OCTET_KINDS, Reader, check_length, 
 
 _SequenceReader: TypeAlias = Callable[[object], Sequence[Any]]
 
-# The `array` type codes of rosidl_generator_py.
-_TYPE_CODES: Final = {
+# The type codes of `array` in rosidl_generator_py, which `struct` has, too.
+TYPE_CODES: Final = {
     'char': 'B',
     'int8': 'b',
     'uint8': 'B',
@@ -41,12 +41,12 @@ _OCTET_FORMATS: Final = frozenset({'B', 'c'})
 
 def is_numpy_array(field_type: FieldType) -> bool:
     """Tell whether the values of a field are NumPy arrays."""
-    return field_type.array == 'fixed' and field_type.kind in _TYPE_CODES
+    return field_type.array == 'fixed' and field_type.kind in TYPE_CODES
 
 
 def is_number_array(field_type: FieldType) -> bool:
     """Tell whether a field has an array of numbers, of NumPy or an `array.array`."""
-    return field_type.array is not None and field_type.kind in _TYPE_CODES
+    return field_type.array is not None and field_type.kind in TYPE_CODES
 
 
 def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
@@ -57,7 +57,7 @@ def array_reader(field_type: FieldType, read_item: Reader) -> Reader:
         read_item: Reads its items.
     """
     read_list = _list_reader(field_type, read_item)
-    if field_type.kind not in _TYPE_CODES:
+    if field_type.kind not in TYPE_CODES:
         return read_list
     read_numbers = _number_reader(field_type, read_list)
     if field_type.array != 'fixed':
@@ -87,7 +87,7 @@ def _list_reader(field_type: FieldType, read_item: Reader) -> _SequenceReader:
 
 
 def _number_reader(field_type: FieldType, read_list: _SequenceReader) -> Reader:
-    code = _TYPE_CODES[field_type.kind]
+    code = TYPE_CODES[field_type.kind]
 
     def read(value: object) -> 'array[Any]':
         if type(value) is array and value.typecode == code:
@@ -104,7 +104,7 @@ def _number_reader(field_type: FieldType, read_list: _SequenceReader) -> Reader:
 
 def _copy_fast(kind: str, value: object) -> 'array[Any] | None':
     """Return a copy of numbers that are valid as a whole, None if each must be checked."""
-    code = _TYPE_CODES[kind]
+    code = TYPE_CODES[kind]
     if isinstance(value, list | tuple):
         return _copy_list(code, value)
     if isinstance(value, memoryview) and value.format == code:
