@@ -55,7 +55,7 @@ def _wait_for_tick() -> int:
     """
     with tempfile.TemporaryFile(buffering=0) as file:
         begun_ns = os.fstat(file.fileno()).st_mtime_ns
-        while os.fstat(file.fileno()).st_mtime_ns <= begun_ns:
+        while os.fstat(file.fileno()).st_mtime_ns == begun_ns:
             time.sleep(_POLL_SEC)
             file.write(b'\n')
     return begun_ns
