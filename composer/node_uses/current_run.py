@@ -14,7 +14,6 @@ from composer.node_uses.reading import (
     NodeUse,
     Problem,
     Reading,
-    StateUse,
 )
 
 if TYPE_CHECKING:
@@ -151,7 +150,7 @@ class Run:
     def use_state(self, name: str, module: ModuleSource, node: ast.expr) -> None:
         """Note that a name of `node.state` is read."""
         is_guarded = bool(self.guards or self.doubts or self.state_doubts)
-        use = StateUse(name, module.span_of(node, name), is_guarded)
+        use = NodeUse('state', name, module.span_of(node, name), is_guarded=is_guarded)
         self.reading.state_read.append(use)
 
     def set_state(self, name: str, scope: Scope, node: ast.expr) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import builtins
 import sys
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, TypeAlias, TypeGuard
 
 from composer.python_source.annotations import find_interface
@@ -182,19 +182,12 @@ class Names:
         self._finder = finder
         self._module_names: dict[int, str] = {}
         self._followed: set[tuple[int, str]] = set()
-        # By the definition, which stays as long as its module.
-        self._kinds: dict[int, FunctionKind | None] = {}
         # How many expressions were walked through.
         self.walked = 0
-        self._stored: dict[int, dict[str, list[Stored]]] = {}
-        self._members: dict[int, _Members] = {}
+        self.kind_of = cache(_kind_of)
+        self.stored_in = cache(find_stored)
+        self._members_of = cache(_Members)
         self._steps = 0
-
-    def kind_of(self, definition: FunctionNode) -> FunctionKind | None:
-        """Return what a function returns; reading all of it takes its time."""
-        if id(definition) not in self._kinds:
-            self._kinds[id(definition)] = FunctionSource(definition).kind
-        return self._kinds[id(definition)]
 
     def find_module(self, name: str) -> ModuleSource | None:
         """Return a module of the project, if it is one and can be read."""
@@ -281,12 +274,6 @@ class Names:
                 return None
             within = within.outer
         return self.top_value(scope.module, name)
-
-    def stored_in(self, definition: ast.AST | None) -> dict[str, list[Stored]]:
-        """Return the names that a function stores, and what it assigns to each."""
-        if id(definition) not in self._stored:
-            self._stored[id(definition)] = find_stored(definition)
-        return self._stored[id(definition)]
 
     def _stored_value(self, stored: list[Stored], scope: Scope) -> Value | None:
         expression, is_item = stored[0]
@@ -397,11 +384,6 @@ class Names:
                 return self.value_of(kept, Scope(each.module, method, given))
         return None
 
-    def _members_of(self, definition: ast.ClassDef) -> _Members:
-        if id(definition) not in self._members:
-            self._members[id(definition)] = _Members(definition)
-        return self._members[id(definition)]
-
     def _is_stored(self, module: ModuleSource, name: str, times: int = 0) -> bool:
         """Return whether code may store an attribute more often than that."""
         stored = module.top.stored_attributes
@@ -452,6 +434,10 @@ class Names:
             case Chain(path=('node', 'with_own_state')):
                 return Chain(('node',))
         return None
+
+
+def _kind_of(definition: FunctionNode) -> FunctionKind | None:
+    return FunctionSource(definition).kind
 
 
 def find_stored(definition: ast.AST | None) -> dict[str, list[Stored]]:

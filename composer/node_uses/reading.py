@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from composer.entity_kinds import PUBLISHED, USED_KINDS
@@ -42,11 +42,10 @@ SENDING_METHODS = {
 
 @record
 class NodeUse:
-    """A use of an entity of the node by its name, as in `node.publish('status', …)`.
+    """A use of something of the node by its name, as in `node.publish('status', …)`.
 
     Attributes:
-        kind: The noun of the entity's kind.
-        place: Where the name is written.
+        kind: The noun of the entity's kind; `state` or `own_state` for a name that is read there.
         is_optional: Whether the behaviour works without it: `node.parameters.get('x')`.
         has_default: Whether the behaviour has a value to use without it.
         is_certain: Whether it happens whatever else the file says: it does not depend on
@@ -74,10 +73,9 @@ class CreatedEntity:
 
     Attributes:
         kind: The noun of its kind.
-        name: The name by which behaviours use it; `None` for one that is not known.
-        channel: The name of its topic or service, as it is given; `None` for any.
-        type: The full name of its type; `None` for any.
-        type_place: Where the type is written.
+        name: The name by which behaviours use it; like what follows, `None` if it is not known.
+        channel: The name of its topic or service.
+        type: The full name of its type.
     """
 
     kind: str
@@ -89,32 +87,13 @@ class CreatedEntity:
 
 @record
 class Problem:
-    """Something wrong in a behaviour, whatever its node declares.
-
-    Attributes:
-        rule: The name of the rule that it breaks.
-        place: Where it is written.
-        related: Other places that have to do with it.
-    """
+    """Something wrong in a behaviour, whatever its node declares."""
 
     rule: str
     message: str
     place: Span
     help: str | None = None
     related: tuple[Related, ...] = ()
-
-
-@record
-class StateUse:
-    """A name of `node.state` or `node.own_state` that is read.
-
-    Attributes:
-        is_guarded: Whether the behaviour does something about one that is not there.
-    """
-
-    name: str
-    place: Span
-    is_guarded: bool = False
 
 
 @record
@@ -156,8 +135,6 @@ class Awaited:
     Attributes:
         kind: The class of the object, as in `threading.Event`; empty for a name itself.
         owner: The file and the place of the object; `state` for a name of the state.
-        name: The name by which it is shown.
-        made_at: Where the object is made.
     """
 
     kind: str
@@ -206,7 +183,6 @@ class MessageUse:
     Attributes:
         path: The names and indices that lead to it: `('poses', '[0]', 'position')`.
         of_type: The type of a message that the code makes; `None` for the one that is given.
-        is_write: Whether it is written to.
         compared: The comparison with a constant that it is a part of.
         is_certain: Whether the file does not decide on it.
         value: What is stored there.
@@ -236,29 +212,17 @@ class Reading:
     """All that is known of what a behaviour does.
 
     Attributes:
-        uses: What it uses of its node.
-        problems: What is wrong in it.
         open_kinds: The kinds of which it may use more.
         reads_others: Whether it may read parameters of other nodes.
         reaches_ros: Whether it uses the node of rclpy, and may declare parameters there.
-        state_read: What it reads of `node.state`.
-        state_set: The names that it sets there, and where.
-        is_state_open: Whether it may set others.
+        is_state_open: Whether it may set other names of `node.state` than those of `state_set`.
         state_tested: The names that it asks for with `hasattr`.
-        own_state_read: What it reads of `node.own_state`; `own_state_set` and `is_own_state_open`
-            are as those of `state`.
-        modules: The modules that it needs.
         unpublished: Where it gives away payloads that nothing publishes.
-        remote_parameters: Parameters of nodes that it sets or reads by their names.
         blocks: What it waits for without an end.
         fills: What it brings about that others may wait for, and whether it does so itself: what
             it starts may do so, too.
         asked: What it asks first, as in `queue.empty()`.
         sleeps: How long it sleeps, in seconds, and where.
-        created: The entities that it creates.
-        payloads: What it sends, yields and returns, as it is written.
-        message_uses: What it reads and writes of the message.
-        values_needed: The parameters and states that have to have a value, and where.
         passed: What the functions are given that it runs.
     """
 
@@ -267,11 +231,11 @@ class Reading:
     open_kinds: set[str] = field(default_factory=set)
     reads_others: bool = False
     reaches_ros: bool = False
-    state_read: list[StateUse] = field(default_factory=list)
+    state_read: list[NodeUse] = field(default_factory=list)
     state_set: dict[str, Span] = field(default_factory=dict)
     is_state_open: bool = False
     state_tested: set[str] = field(default_factory=set)
-    own_state_read: list[StateUse] = field(default_factory=list)
+    own_state_read: list[NodeUse] = field(default_factory=list)
     own_state_set: set[str] = field(default_factory=set)
     is_own_state_open: bool = False
     modules: dict[int, ModuleSource] = field(default_factory=dict)
@@ -294,16 +258,14 @@ class Reading:
         self.is_own_state_open = True
 
 
-def unknown_reading() -> Reading:
-    """Return the reading of a behaviour whose source is not known."""
-    reading = Reading()
-    reading.open_all()
-    return reading
-
-
 def missing_reading() -> Reading:
     """Return the reading of a behaviour that does not exist, which another check reports."""
     return Reading(open_kinds=set(USED_NOUNS), is_state_open=True, is_own_state_open=True)
+
+
+def unknown_reading() -> Reading:
+    """Return the reading of a behaviour whose source is not known."""
+    return replace(missing_reading(), reads_others=True, reaches_ros=True)
 
 
 @record
@@ -312,8 +274,6 @@ class Wire:
 
     Attributes:
         given: The type of its second argument.
-        yielded: The type that each yielded payload becomes.
-        returned: The type that a returned payload becomes.
         aborted: The type of the result with which an action aborts a goal.
         is_unpublished: Whether nothing publishes what it gives, although `publish:` could.
         needs_payload: Whether a response has to be returned.
@@ -330,11 +290,7 @@ class Wire:
 
 
 def wire_of(node: NodeSpec, binding: Binding, has_real_type: Callable[[EndSpec], bool]) -> Wire:
-    """Return the types around a behaviour of a node.
-
-    Args:
-        has_real_type: Whether the type of an entity is the one that is meant.
-    """
+    """Return the types around a behaviour of a node."""
     kind, key = binding.kind, binding.key
     if kind is None or binding.entity is None:
         return Wire()

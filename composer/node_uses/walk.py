@@ -28,14 +28,20 @@ from composer.node_uses.reading import (
     Awaited,
     MessageUse,
     NeededValue,
+    NodeUse,
     Passed,
     Payload,
-    StateUse,
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import read_signature
-from composer.python_source.syntax import list_arguments, list_children, stored_names, words_in
+from composer.python_source.syntax import (
+    list_arguments,
+    list_children,
+    list_nodes,
+    stored_names,
+    words_in,
+)
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -256,8 +262,6 @@ class Walk:
                     self.visit(target, scope)
             case ast.Assign(targets=targets, value=value):
                 self._assign(targets, value, scope)
-            case ast.Return(value=ast.expr() as value):
-                self.visit(value, scope)
             case _:
                 for child in list_children(node):
                     if isinstance(child, ast.expr):
@@ -360,7 +364,7 @@ class Walk:
             case [ast.Name(id=name)], ast.Call(func=func):
                 nodes = ast.walk(scope.definition or ast.Pass())
                 is_alone = [getattr(each, 'id', '') for each in nodes].count(name) == 1
-                if is_alone and self._kind_of(func, scope) == 'coroutine':
+                if is_alone and self._kind_of(func, scope) is FunctionKind.COROUTINE:
                     text = f"'{name}' is a coroutine that is never awaited, so it never runs"
                     help_text = 'put await before it'
                     self.run.report('missing-await', scope.module, value, text, help_text)
@@ -388,29 +392,25 @@ class Walk:
             match self._names.value_of(node, scope):
                 case Chain(path=('node', name)) if name in node_calls.NODE_METHODS:
                     run.report('no-effect', module, node, 'this is not called', f'write {name}()')
-        elif isinstance(node, ast.Call) and self._kind_of(node.func, scope) == 'coroutine':
-            text = f"'{ast.unparse(node.func)}(…)' is never awaited, so it never runs"
-            run.report('missing-await', module, node.func, text, 'put await before it')
-        elif isinstance(node, ast.Call) and self._kind_of(node.func, scope) == 'generator':
-            text = 'this makes a generator, and nothing goes through it'
-            run.report('no-effect', module, node, text, "write 'yield from' before it")
         elif isinstance(node, ast.Call):
-            match self._names.value_of(node, scope):
-                case Made(kind=waiting.THREAD):
+            match self._kind_of(node.func, scope), self._names.value_of(node, scope):
+                case FunctionKind.COROUTINE, _:
+                    text = f"'{ast.unparse(node.func)}(…)' is never awaited, so it never runs"
+                    run.report('missing-await', module, node.func, text, 'put await before it')
+                case FunctionKind.GENERATOR, _:
+                    text = 'this makes a generator, and nothing goes through it'
+                    run.report('no-effect', module, node, text, "write 'yield from' before it")
+                case _, Made(kind=waiting.THREAD):
                     text = 'this thread is never started'
                     run.report('no-effect', module, node, text, 'write .start()')
 
-    def _kind_of(self, func: ast.expr, scope: Scope) -> str:
-        """Return what a call makes that does nothing by itself: a coroutine, or a generator."""
+    def _kind_of(self, func: ast.expr, scope: Scope) -> FunctionKind | None:
         match self._names.value_of(func, scope):
             case Chain(path=('node', 'call_async') | ('goal', _, 'result_async')):
-                return 'coroutine'
+                return FunctionKind.COROUTINE
             case Function(definition=ast.FunctionDef() | ast.AsyncFunctionDef() as definition):
-                kind = self._names.kind_of(definition)
-                if kind is FunctionKind.COROUTINE:
-                    return 'coroutine'
-                return 'generator' if kind is FunctionKind.GENERATOR else ''
-        return ''
+                return self._names.kind_of(definition)
+        return None
 
     # Conditions
 
@@ -447,7 +447,10 @@ class Walk:
                 return self._strongest(values, scope, seen | {name}) or ''
             case ast.Compare() | ast.BinOp() | ast.Call():
                 # A value of the run beside one of the file: both outcomes may come.
-                operands = _operands(node)
+                operands = list_children(node)
+                if isinstance(node, ast.Call):
+                    # Of what is called, only its owner counts.
+                    operands = [*list_children(node.func), *operands[1:]]
                 if any(self._asks_what_it_is(each, scope) for each in operands):
                     return 'fixed'
                 found = [self._decided_by(each, scope, seen) for each in operands]
@@ -493,12 +496,11 @@ class Walk:
         key = id(scope.definition)
         if key not in self._asked:
             self._asked[key] = set()
-            for test in _tests_in(scope.definition):
-                for node in ast.walk(test):
-                    if isinstance(node, ast.Attribute | ast.Name):
-                        match self._names.value_of(node, scope):
-                            case Chain(path=('node', 'parameters' | 'state' as of, name, *_)):
-                                self._asked[key].add(f'{of}.{name}')
+            for node in list_nodes(_tests_in(scope.definition)):
+                if isinstance(node, ast.Attribute | ast.Name):
+                    match self._names.value_of(node, scope):
+                        case Chain(path=('node', 'parameters' | 'state' as of, name, *_)):
+                            self._asked[key].add(f'{of}.{name}')
         return self._asked[key]
 
     def need(self, node: ast.expr, scope: Scope) -> None:
@@ -604,11 +606,8 @@ class Walk:
             case Chain(path=('node', 'publishers')):
                 self.run.use('publisher', self._names.value_of(key, scope))
             case Chain(path=('node', 'own_state')):
-                named = self._names.value_of(key, scope)
-                if not isinstance(named, Texts):
-                    self.run.reading.is_own_state_open = True
-                elif is_stored:
-                    self.run.reading.own_state_set |= named.all
+                if is_stored:
+                    self._set_own_state(key, scope)
                 else:
                     self._read_own_state(key, scope)
             case Chain(path=('node', 'state')):
@@ -619,11 +618,18 @@ class Walk:
                 self.visit(node.value, scope)
         self.visit(key, scope)
 
+    def _set_own_state(self, key: ast.expr | None, scope: Scope) -> None:
+        named = self._names.value_of(key, scope) if key else None
+        if isinstance(named, Texts):
+            self.run.reading.own_state_set |= named.all
+        else:
+            self.run.reading.is_own_state_open = True
+
     def _read_own_state(self, key: ast.expr, scope: Scope) -> None:
         named = self._names.value_of(key, scope)
         is_guarded = bool(self.run.guards or self.run.doubts)
         for text, node, module in named.options if isinstance(named, Texts) else ():
-            use = StateUse(text, module.span_of(node, text), is_guarded)
+            use = NodeUse('own_state', text, module.span_of(node, text), is_guarded=is_guarded)
             self.run.reading.own_state_read.append(use)
 
     def _compare(self, node: ast.Compare, scope: Scope) -> None:
@@ -636,8 +642,8 @@ class Walk:
                         is_change = path == ('changes',)
                         self.run.ask('parameter', named, is_change=is_change)
                         operands = [node.left]
-                    case Chain(path=('node', 'own_state')) if isinstance(named, Texts):
-                        self.run.reading.own_state_set |= named.all
+                    case Chain(path=('node', 'own_state')):
+                        self._set_own_state(node.left, scope)
                         operands = [node.left]
             case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE()]):
                 for operand in operands:
@@ -794,13 +800,10 @@ class Walk:
                 self._follow(func, call, scope, is_waited=not is_later)
                 return
             case Class() as of:
-                instance = self._names.instance_of(of, None, scope)
+                instance = self._names.instance_of(of, call, scope)
                 init = self._names.attribute(instance, '__init__')
                 if isinstance(init, Function):
-                    bound = Function(
-                        init.module, init.definition, self._names.instance_of(of, call, scope)
-                    )
-                    self._follow(bound, call, scope, is_waited=True)
+                    self._follow(init, call, scope, is_waited=True)
                     return
             case External(name='time.sleep') if call.args:
                 waiting.note_sleep(self.run, call.args[0], call, scope)
@@ -931,23 +934,16 @@ class Walk:
             self.visit(node, scope)
 
     def _call_own_state(self, method: str, call: ast.Call, scope: Scope) -> None:
-        reading = self.run.reading
-        named = self._names.value_of(call.args[0], scope) if call.args else None
+        keys: list[ast.expr | None] = []
         if method == 'update':
-            reading.own_state_set |= {each.arg for each in call.keywords if each.arg}
-            for node in call.args:
-                keys = node.keys if isinstance(node, ast.Dict) else [None]
-                for key in keys:
-                    if isinstance(key, ast.Constant):
-                        reading.own_state_set.add(str(key.value))
-                    else:
-                        reading.is_own_state_open = True
-        elif method in ('get', 'setdefault', 'pop') and isinstance(named, Texts):
+            self.run.reading.own_state_set |= {each.arg for each in call.keywords if each.arg}
+            keys = [key for node in call.args for key in getattr(node, 'keys', [None])]
+        elif method in ('get', 'setdefault', 'pop'):
+            keys = [*call.args[:1]]
             if method == 'pop' and len(call.args) == 1:
                 self._read_own_state(call.args[0], scope)
-            reading.own_state_set |= named.all
-        elif method in ('get', 'setdefault', 'pop'):
-            reading.is_own_state_open = True
+        for key in keys:
+            self._set_own_state(key, scope)
 
     def _call_attribute(self, function: str, call: ast.Call, scope: Scope) -> bool:
         """Note what `hasattr(node.state, 'x')` and the like use; return whether that is all."""
@@ -970,16 +966,6 @@ class Walk:
         for node in call.args[2:]:
             self.visit(node, scope)
         return True
-
-
-def _operands(node: ast.Compare | ast.BinOp | ast.Call) -> list[ast.expr]:
-    match node:
-        case ast.Compare(left=left, comparators=others):
-            return [left, *others]
-        case ast.BinOp(left=left, right=right):
-            return [left, right]
-    owner = [node.func.value] if isinstance(node.func, ast.Attribute) else []
-    return [*owner, *node.args, *(each.value for each in node.keywords)]
 
 
 def _prefix(node: ast.expr, name: str) -> ast.expr:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
+from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,10 +82,8 @@ class ModuleFinder:
         installed = [Path(entry) for entry in sys.path if entry]
         self._roots = list(dict.fromkeys([*search_path, *installed]))
         self._found: dict[str, ModuleSource | MissingModule] = {}
-        self._located: dict[str, _Location] = {}
-        self._names: dict[Path, frozenset[str]] = {}
-        self._modules: dict[Path, list[str]] = {}
-        self._is_own: dict[str, bool] = {}
+        self._locate = cache(self._locate_anew)
+        self._list_names = cache(_list_names)
         self._tokens_left = MAX_TOKENS_OF_MODULES
 
     def find(self, name: str) -> ModuleSource | MissingModule:
@@ -133,8 +132,9 @@ class ModuleFinder:
         if not located.missing:
             return None
         *done, part = located.missing.split('.')
-        known = {name for folder in located.folders for name in self._list_modules(folder)}
-        near = find_nearest(part, known)
+        paths = [folder / name for folder in located.folders for name in self._list_names(folder)]
+        known = {path.stem for path in paths if path.suffix == '.py' or os.path.isdir(path)}
+        near = find_nearest(part, (name for name in known if name.isidentifier()))
         nearest = '.'.join([*done, near]) if near else None
         return MissingModule(located.missing, nearest, self._find_hiding(done, part))
 
@@ -146,15 +146,14 @@ class ModuleFinder:
     def is_of_project(self, name: str) -> bool:
         """Return whether a module, or the package that it is in, is not an installed one."""
         top = name.partition('.')[0]
-        if top not in self._is_own:
-            file, folders = self._locate_part(top, self._roots)
-            is_built = file is None and top in self._interfaces
-            found = [] if is_built else [*([file] if file else []), *folders[:1]]
-            # Python asks no folder for these, whatever is there.
-            is_built_in = top in sys.builtin_module_names
-            is_own = any(each.parent in self._project for each in found)
-            self._is_own[top] = not is_built_in and (is_own or self.is_of_ros_package(top))
-        return self._is_own[top]
+        # Python asks no folder for these, whatever is there.
+        if top in sys.builtin_module_names:
+            return False
+        file, folders = self._locate_part(top, self._roots)
+        is_built = file is None and top in self._interfaces
+        places = [] if is_built else [file, *folders[:1]]
+        is_own = any(place and place.parent in self._project for place in places)
+        return is_own or self.is_of_ros_package(top)
 
     def is_of_ros_package(self, name: str) -> bool:
         """Return whether a module is in the Python package of the ROS package of the files.
@@ -163,11 +162,6 @@ class ModuleFinder:
         """
         top = name.partition('.')[0]
         return any(each.name == top and each.parent.name == 'share' for each in self._project)
-
-    def _locate(self, name: str) -> _Location:
-        if name not in self._located:
-            self._located[name] = self._locate_anew(name)
-        return self._located[name]
 
     def _locate_anew(self, name: str) -> _Location:
         folders = self._roots
@@ -211,20 +205,12 @@ class ModuleFinder:
                 portions.append(package)
         return None, portions
 
-    def _list_names(self, folder: Path) -> frozenset[str]:
-        if folder not in self._names:
-            try:
-                self._names[folder] = frozenset(os.listdir(folder))  # noqa: PTH208 - fast
-            except OSError:
-                self._names[folder] = frozenset()
-        return self._names[folder]
 
-    def _list_modules(self, folder: Path) -> list[str]:
-        if folder not in self._modules:
-            paths = [folder / name for name in self._list_names(folder)]
-            names = [path.stem for path in paths if path.suffix == '.py' or os.path.isdir(path)]
-            self._modules[folder] = [name for name in names if name.isidentifier()]
-        return self._modules[folder]
+def _list_names(folder: Path) -> frozenset[str]:
+    try:
+        return frozenset(os.listdir(folder))  # noqa: PTH208 - fast
+    except OSError:
+        return frozenset()
 
 
 def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:

@@ -21,7 +21,7 @@ _VALUES = (
     *(ast.BinOp, ast.Compare, ast.Dict, ast.DictComp, ast.JoinedStr, ast.List, ast.ListComp),
     *(ast.Tuple, ast.UnaryOp),
 )
-_WITHOUT_RETURN = {'exit', 'quit', 'sys.exit', 'os._exit', 'os.abort'}
+# What never returns.
 _EXITS = {
     *('_exit', 'abort', 'assert_never', 'execl', 'execv', 'execve', 'execvp', 'exit', 'fail'),
     'quit',
@@ -85,7 +85,7 @@ def _is_value(answer: ast.expr | None, sure: set[str]) -> bool:
 
 
 def ends_without_value(
-    function: FunctionNode, is_last: Callable[[ast.Call], bool] | None = None
+    function: FunctionNode, is_last: Callable[[ast.Call], bool]
 ) -> list[ast.AST]:
     """Return where a function ends without a value, on ways that are there for certain.
 
@@ -95,12 +95,7 @@ def ends_without_value(
         is_last: Whether a call never returns; others have the names of such functions.
     """
     has_value = any(not _is_bare(answer) for answer in _returns(function))
-
-    def ends(call: ast.Call) -> bool:
-        is_named = _last_name(call.func) in _EXITS
-        return is_named or bool(is_last and is_last(call))
-
-    ways = _Ways(function, ends, is_certain=has_value)
+    ways = _Ways(function, is_last, is_certain=has_value)
     is_end = ways.follow(function.body, frozenset()) is not None
     return [*ways.bare, *([function] if is_end else [])]
 
@@ -115,10 +110,7 @@ def never_returns(function: FunctionNode) -> bool:
 
 def _ends(function: FunctionNode) -> bool:
     """Return whether no way through a function comes to its end: all return or raise."""
-    ways = _Ways(
-        function, lambda call: dotted_name(call.func) in _WITHOUT_RETURN, is_certain=False
-    )
-    return ways.follow(function.body, frozenset()) is None
+    return _Ways(function, is_certain=False).follow(function.body, frozenset()) is None
 
 
 def _is_bare(statement: ast.Return) -> bool:
@@ -140,7 +132,11 @@ class _Ways:
     """
 
     def __init__(
-        self, function: FunctionNode, is_last: Callable[[ast.Call], bool], *, is_certain: bool
+        self,
+        function: FunctionNode,
+        is_last: Callable[[ast.Call], bool] = lambda _: False,
+        *,
+        is_certain: bool,
     ) -> None:
         self.bare: list[ast.expr | ast.Return] = []
         self._message = _message_of(function)
@@ -173,7 +169,8 @@ class _Ways:
             case ast.Raise() | ast.Assert(test=ast.Constant(value=False | 0)):
                 pass
             case ast.Expr(value=(ast.Call() as call) | ast.Await(value=ast.Call() as call)):
-                return None if self._is_last(call) else tested
+                is_exit = _last_name(call.func) in _EXITS
+                return None if is_exit or self._is_last(call) else tested
             case ast.If():
                 return self._past_if(statement, tested)
             case ast.With() | ast.AsyncWith():

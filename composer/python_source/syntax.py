@@ -22,8 +22,7 @@ _TOKEN = re.compile(rb'\w+|[^\w ]')
 _CODE_OBJECT = re.compile(rb'\b(?:def|lambda)\b|\bfor\b[^\n]*?\bin\b')
 _MOST_CODE_OBJECTS = 4000
 # It copies each `finally` for each way out of its `try`: nested ones make gigabytes of a line.
-_MOST_COPIED_CHARACTERS = 200_000
-_CHARACTERS_OF_LINE = 40
+_MOST_COMPILED_NODES = 300_000
 _WAYS_OUT = (ast.Return, ast.Break, ast.Continue)
 SCOPES = (*FUNCTIONS, ast.ClassDef, ast.Lambda)
 # The fields of statements that hold others.
@@ -177,39 +176,27 @@ def parse_source(content: bytes, path: Path) -> ast.Module:
         compile(content, str(path), 'exec', dont_inherit=True)
         message = f'{path} nests too deep'
         raise UnreadModuleError(message) from error
-    if len(_CODE_OBJECT.findall(content)) <= _MOST_CODE_OBJECTS:
-        written, compiled, _ = _measure(tree.body)
-        if compiled - written <= _MOST_COPIED_CHARACTERS:
-            # The compiler finds more errors than the parser, such as `return` outside a function.
-            compile(content, str(path), 'exec', dont_inherit=True)
+    few_code_objects = len(_CODE_OBJECT.findall(content)) <= _MOST_CODE_OBJECTS
+    if few_code_objects and _measure(tree.body)[0] <= _MOST_COMPILED_NODES:
+        # The compiler finds more errors than the parser, such as `return` outside a function.
+        compile(content, str(path), 'exec', dont_inherit=True)
     return tree
 
 
-def _measure(body: Iterable[ast.AST]) -> tuple[int, int, int]:
-    """Return the size of a block as written and as compiled, and the ways out of it."""
-    written = compiled = ways_out = 0
-    pending: list[ast.AST] = list(body)
+def _measure(nodes: Iterable[ast.AST]) -> tuple[int, int]:
+    """Return how many nodes the compiler makes of these, and how many ways lead out of them."""
+    size = ways_out = 0
+    pending = [*nodes]
     while pending:
         node = pending.pop()
+        size += 1
         ways_out += isinstance(node, _WAYS_OUT)
-        blocks = [getattr(node, name, None) or [] for name in BLOCKS]
-        if not any(blocks):
-            size = _size_of(node)
-            written, compiled = written + size, compiled + size
-        elif final := getattr(node, 'finalbody', None):
-            inner = _measure(each for block in blocks[:-1] for each in block)
-            last = _measure(final)
-            copies = 2 + inner[2]
-            written += inner[0] + last[0]
-            compiled += inner[1] + last[1] * copies
-            ways_out += inner[2] + last[2] * copies
+        if isinstance(node, ast.Try | ast.TryStar) and node.finalbody:
+            inner = _measure([*node.body, *node.handlers, *node.orelse])
+            last = _measure(node.finalbody)
+            copies = 2 + inner[1]
+            size += inner[0] + last[0] * copies
+            ways_out += inner[1] + last[1] * copies
         else:
-            pending += (each for block in blocks for each in block if isinstance(each, ast.AST))
-    return written, compiled, ways_out
-
-
-def _size_of(node: ast.AST) -> int:
-    """Return the length of a statement in characters, about."""
-    lines = (getattr(node, 'end_lineno', 0) or 0) - getattr(node, 'lineno', 0)
-    columns = (getattr(node, 'end_col_offset', 0) or 0) - getattr(node, 'col_offset', 0)
-    return lines * _CHARACTERS_OF_LINE if lines else columns
+            pending += list_children(node)
+    return size, ways_out
