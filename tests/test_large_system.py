@@ -228,6 +228,7 @@ def test_a_finding_in_the_deepest_file_is_said_there_with_all_includes(system, c
 
 
 @pytest.mark.ros
+@pytest.mark.long
 def test_what_is_shown_runs_as_the_same_system(system, shown, compose, wait_for):
     flat = compose.folder / 'flat.yaml'
     flat.write_text(shown('show', *ARGUMENTS))

@@ -55,6 +55,7 @@ def _run_in_child(folder, output, words, more):
     os._exit(code)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize('name', CASES)
 def test_hostile_files_end_in_findings(name, tmp_path):
     write_files, rules = CASES[name]

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from composer.hosts.wheels import read_folder, write_composer_wheel
 
 
@@ -20,6 +22,7 @@ def test_what_tools_leave_does_not_count(tmp_path):
     assert [name for name, _ in read_folder(tmp_path)] == ['a.py', 'data/model.onnx']
 
 
+@pytest.mark.long
 def test_pip_installs_the_wheel_of_composer_and_it_runs(tmp_path):
     path = write_composer_wheel(tmp_path)
     data = path.read_bytes()

@@ -117,6 +117,7 @@ QUICK = settings(
 )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize('name', NAMES)
 def test_both_give_the_same_verdict_in_the_same_words(name: str) -> None:
     description = CATALOGUE.describe(name)
@@ -135,6 +136,7 @@ def test_both_give_the_same_verdict_in_the_same_words(name: str) -> None:
     assert verdicts == {True, False}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize('name', NAMES)
 def test_right_data_pass_the_check_and_arrive(name: str) -> None:
     description = CATALOGUE.describe(name)

@@ -44,10 +44,12 @@ def test_a_host_that_was_gone_is_found_again(create_hosts, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize('how', [('cut', 'mend'), ('take_down', 'bring_up')])
 @pytest.mark.parametrize(
-    'network',
-    [{'discovery': 'peers'}, {'discovery': 'discovery_server', 'server': 'base'}],
+    ('network', 'how'),
+    [
+        ({'discovery': 'peers'}, ('cut', 'mend')),
+        ({'discovery': 'discovery_server', 'server': 'base'}, ('take_down', 'bring_up')),
+    ],
     ids=['peers', 'discovery_server'],
 )
 def test_a_host_is_found_again_with_the_usual_leases(create_hosts, network, how):

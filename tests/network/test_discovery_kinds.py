@@ -76,8 +76,8 @@ def test_a_discovery_server_that_was_killed_is_there_again(create_hosts):
 
 @pytest.mark.long
 @pytest.mark.parametrize('kind', ['peers', 'discovery_server'])
-def test_five_hosts_hear_all_others(create_hosts, kind):
-    names = ['base', 'jetson', 'arm', 'front', 'rear']
+def test_three_hosts_hear_all_others(create_hosts, kind):
+    names = ['base', 'jetson', 'arm']
     hosts = create_hosts(*names)
     nodes = ''.join(
         f"""

@@ -37,6 +37,7 @@ def test_the_files_without_errors_are_valid(files):
     assert check(files) == []
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(('file', 'edit', 'said'), ROWS)
 def test_a_written_error_is_found_in_its_line(files, file, edit, said):
     path = files / file

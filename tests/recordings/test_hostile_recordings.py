@@ -188,6 +188,7 @@ def test_a_check_of_a_scenario_is_done_in_seconds(name, in_folder):
 
 
 @pytest.mark.ros
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     'name', [each for each in CASES if each != 'tiny_records' and CASES[each][1] != SLOW]
 )

@@ -153,6 +153,6 @@ def test_shipped_systems_are_the_same(tmp_path, interface_cache):
     here.mkdir()
     for name in ('behaviours', 'configs', 'interfaces', 'tests/systems'):
         shutil.copytree(ROOT / name, here / name)
-    names = ('cell', 'patrol', 'warehouse')
+    names = ('patrol', 'warehouse')
     words = [f'tests/systems/{name}.scenario.yaml' for name in names]
     check_that_they_are_the_same(here, tmp_path / 'there', words)

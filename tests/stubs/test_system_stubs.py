@@ -100,6 +100,7 @@ def write(folder, files):
         (folder / name).write_text(text)
 
 
+@pytest.mark.long
 def test_mypy_finds_no_error_in_the_stubs_of_systems_and_those_of_uses(tmp_path):
     # In place of the package itself, which mypy takes a minute to read.
     files = stand_ins()
