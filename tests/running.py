@@ -266,14 +266,7 @@ class Peer:
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain_id)
-        # Without what no test asks it for: each of its ends costs all others their discovery.
-        self.node = rclpy.create_node(
-            'peer',
-            context=self.context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
+        self.node = rclpy.create_node('peer', context=self.context, use_global_arguments=False)
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self._spinning = True
