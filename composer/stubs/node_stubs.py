@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.records import record
@@ -78,22 +77,16 @@ def shape_of(
         created: What its behaviours create.
     """
     known = [names for names in stored if names is not None]
+    parameters = {name: _type_of(each) for name, each in node.parameters.items()}
     names = sorted({*node.state}.union(*known))
     state = ((name, (_type_of_state(node.state.get(name), known, name),)) for name in names)
     return NodeShape(
         _types(node.publishers, created, 'publisher'),
         _types(node.service_clients, created, 'service client'),
         _types(node.action_clients),
-        parameter_types(node),
+        tuple((name, (each,)) for name, each in sorted({**_OWN_PARAMETERS, **parameters}.items())),
         tuple(state) if len(known) == len(stored) else None,
     )
-
-
-def parameter_types(node: NodeSpec) -> Types:
-    """Return the Python types of a node's parameters, with those that rclpy declares."""
-    parameters = {name: (_type_of(each),) for name, each in node.parameters.items()}
-    own = {name: (of_type,) for name, of_type in _OWN_PARAMETERS.items()}
-    return tuple(sorted({**own, **parameters}.items()))
 
 
 def merge_shapes(shapes: Iterable[NodeShape]) -> NodeShape:
@@ -239,7 +232,6 @@ def _name_of(node: ast.expr) -> str:
 
 
 _TIMEOUT = 'timeout: float | None = 5.0'
-_NO_PARAMETER = 'the node declares no such parameter, or one of another type'
 # What a mapping has of its own: `node.parameters.keys` is no parameter.
 _OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
 # The types of Python that parameters have.
@@ -254,19 +246,16 @@ _SETTINGS = (
 )
 
 
-def write_nodes(
-    module: str, classes: Mapping[str, NodeShape], nodes: Iterable[NodeSpec]
-) -> Iterator[str]:
+def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
     """Yield the lines of a stub with nodes.
 
     Args:
         module: Its dotted name.
         classes: The shape of each node, by the name of its class; equal shapes are one class.
-        nodes: Those whose parameters behaviours may set and get.
     """
     imports = StubImports(module)
     first: dict[NodeShape, str] = {}
-    lines = [*_write_base(imports, nodes)]
+    lines: list[str] = []
     for name, shape in classes.items():
         if shape in first:
             lines += ['', f'{name} = {first[shape]}']
@@ -278,65 +267,12 @@ def write_nodes(
     yield from lines
 
 
-def _write_base(imports: StubImports, nodes: Iterable[NodeSpec]) -> Iterator[str]:
-    """Yield the class that the nodes of a system have in common: it knows their parameters."""
-    known = _names_by_parameters([*nodes])
-    anything, mapping = imports.take('typing', 'Any'), imports.take('typing', 'Mapping')
-    of_dict, names_of = imports.take('typing', 'TypedDict'), imports.take('typing', 'Iterable')
-    # The names of nodes, those of parameters, the type of their values, and a decorator.
-    rows: list[tuple[str, str, str, str]] = []
-    for number, (types, names) in enumerate(known.items()):
-        fields = {name: _named(imports, ' | '.join(each)) for name, each in types}
-        entries = ', '.join(f'{name!r}: {of_type}' for name, of_type in fields.items())
-        yield from ('', f'_Values{number} = {of_dict}(')
-        yield f"    '_Values{number}', {{{entries}}}, total=False"
-        yield ')'
-        literals = _literal(imports, names), _literal(imports, fields)
-        rows.append((*literals, f'_Values{number}', ''))
-    if known:
-        # Composer raises an error then. Names of other nodes, and computed ones, are not known.
-        literal, every = imports.take('typing', 'LiteralString'), chain(*known.values())
-        decorator = f'    @{imports.take("typing_extensions", "deprecated")}({_NO_PARAMETER!r})\n'
-        values = f'{mapping}[{literal}, {anything}]'
-        rows.append((_literal(imports, every), literal, values, decorator))
-    rows.append(('str', 'str', f'{mapping}[str, {anything}]', ''))
-    yield from ('', f'class _SystemNode({imports.take("composer", "Node")}):')
-    getters = (
-        f'{decorator}    def get_parameters(self, node_name: {node}, names: {names_of}[{names}], '
-        f'{_TIMEOUT}) -> dict[str, {anything}]: ...'
-        for node, names, _, decorator in rows
-    )
-    setters = (
-        f'{decorator}    def set_parameters(self, node_name: {node}, values: {values}, '
-        f'{_TIMEOUT}) -> None: ...'
-        for node, _, values, decorator in rows
-    )
-    yield from _overloaded(imports, getters)
-    yield from _overloaded(imports, setters)
-
-
-def _names_by_parameters(nodes: Sequence[NodeSpec]) -> dict[Types, list[str]]:
-    """Return the names of nodes by the parameters that they declare."""
-    known: dict[Types, list[str]] = {}
-    is_flat = all(node.full_name.count('/') == 1 for node in nodes)
-    for node in nodes:
-        if not node.allow_undeclared_parameters:
-            # In a namespace, a name without a slash may mean another node.
-            names = [node.full_name, *([node.full_name[1:]] if is_flat else [])]
-            known.setdefault(parameter_types(node), []).extend(names)
-    return known
-
-
 def _overloaded(imports: StubImports, methods: Iterable[str]) -> list[str]:
     several = list(methods)
     if len(several) <= 1:
         return several
     decorator = f'    @{imports.take("typing", "overload")}'
     return [line for method in several for line in (decorator, method)]
-
-
-def _literal(imports: StubImports, names: Iterable[str]) -> str:
-    return f'{imports.take("typing", "Literal")}[{", ".join(map(repr, names))}]'
 
 
 def _named(imports: StubImports, of_type: str) -> str:
@@ -360,7 +296,7 @@ class _Writer:
     def node(self, shape: NodeShape) -> Iterator[str]:
         yield from self._parameters(shape)
         yield from self._state(shape)
-        yield from ('', f'class {self.name}(_SystemNode):')
+        yield from ('', f'class {self.name}({self.imports.take("composer", "Node")}):')
         # Type checkers narrow what is final, as by `is not None`, and no property.
         yield f'    parameters: {self.imports.take("typing", "Final")}[{self.name}Parameters]'
         yield from self._property('state', f'{self.name}State')
@@ -465,4 +401,4 @@ class _Writer:
     def _literal(self, name: str) -> str:
         if not name:
             return 'str'
-        return _literal(self.imports, [name])
+        return f'{self.imports.take("typing", "Literal")}[{name!r}]'

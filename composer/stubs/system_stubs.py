@@ -30,9 +30,7 @@ def stubs_of(context: CheckContext) -> dict[str, str]:
     classes = name_classes(shapes_of(context, modules))
     files = dict(write_messages(context, modules))
     # No `.pyi`: pyright warns of a stub without a module, and here there is none.
-    files[f'{SUPPORT}/{module}.py'] = text_of(
-        write_nodes(f'{SUPPORT}.{module}', classes, all_nodes(context))
-    )
+    files[f'{SUPPORT}/{module}.py'] = text_of(write_nodes(f'{SUPPORT}.{module}', classes))
     return files
 
 

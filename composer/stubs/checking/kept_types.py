@@ -1,4 +1,4 @@
-"""Check the types of behaviours, unless the same ones were found to be right before."""
+"""Check the types of behaviours, unless they were found to be right before."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ import hashlib
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
-from composer.stubs.checking.type_checker import (
-    TESTED_VERSION,
-    TypeCheckerError,
-    keep_result,
-    load_result,
-)
+from composer.interfaces.build.build_cache import find_cache
+from composer.stubs.checking.type_checker import TESTED_VERSION, TypeCheckerError
 from composer.stubs.project_modules import all_nodes, find_project_modules
 
 if TYPE_CHECKING:
@@ -23,6 +19,9 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.stubs.project_modules import ProjectModule
+
+# As many right systems are remembered.
+_MOST_KEPT: Final = 200
 
 
 @dataclass(slots=True)
@@ -47,24 +46,22 @@ class TypesCheck:
         self.was_needed |= bool(modules)
         if not modules or self.program is None:
             return []
-        digest = _digest(self.program, context, modules)
-        kept = load_result(digest)
-        if kept is not None:
-            self.versions.add(kept.version)
-            if kept.is_clean:
-                return []
+        place = find_cache().parent / 'types' / _digest(self.program, context, modules)
+        if place.is_file():
+            self.versions.add(place.read_text(encoding='utf-8'))
+            return []
         # To import it takes longer than all the rest here.
         from composer.stubs.checking.types_check import find_type_errors
 
         try:
-            findings, result = find_type_errors(self.program, context, modules, kept, found)
+            version, findings = find_type_errors(self.program, context, modules)
         except TypeCheckerError as error:
             self.failure = str(error)
             return []
-        self.versions.add(result.version)
-        if result != kept:
-            keep_result(digest, result)
-        return findings
+        self.versions.add(version)
+        if not findings:
+            _keep(place, version)
+        return [*_leave_out_told(findings, found)]
 
     @property
     def note(self) -> str | None:
@@ -78,6 +75,35 @@ class TypesCheck:
         if untested:
             return f'pyrefly {untested} is untested: Composer reads what {TESTED_VERSION} prints'
         return None
+
+
+def _leave_out_told(
+    findings: list[tuple[Diagnostic, range]], found: list[Diagnostic]
+) -> Iterator[Diagnostic]:
+    """Yield the first finding of each statement in which the other checks found nothing."""
+    told = {
+        (span.source.name, span.line)
+        for finding in found
+        for span in (finding.span, *(related.span for related in finding.related))
+        if span is not None
+    }
+    for finding, lines in findings:
+        name = finding.span.source.name if finding.span else ''
+        if not told & {(name, line) for line in lines}:
+            told.add((name, lines[0]))
+            yield finding
+
+
+def _keep(place: Path, version: str) -> None:
+    """Remember a right system; where nothing can be written, the next run is like the first."""
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(version, encoding='utf-8')
+        kept = sorted(place.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+        for path in kept[:-_MOST_KEPT]:
+            path.unlink(missing_ok=True)
+    except OSError:
+        return
 
 
 def _digest(program: Path, context: CheckContext, modules: Mapping[str, ProjectModule]) -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from composer.errors import ComposerError
-from composer.interfaces.build.build_cache import find_cache
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 # The version whose messages are read; pyproject.toml pins it.
 TESTED_VERSION: Final = '1.4.1'
 _TIMEOUT_SEC = 60
-# As many results of runs are kept.
-_MOST_KEPT = 200
 _OPTIONS = ('--config', 'pyrefly.toml', '--output-format', 'json', '--summary=none')
 # The presets differ from version to version, so each kind that is read is named. Whatever is not
 # in the stubs or the project is unknown: of libraries, nothing is reported.
@@ -74,18 +71,6 @@ class TypeReport(NamedTuple):
     message: str
 
 
-class TypeResult(NamedTuple):
-    """What a run of pyrefly gave.
-
-    Attributes:
-        is_clean: Whether no report became a finding.
-    """
-
-    version: str
-    reports: tuple[TypeReport, ...]
-    is_clean: bool = False
-
-
 def find_program() -> Path | None:
     """Return pyrefly: that beside Composer's own Python, or one on the `PATH`."""
     own = Path(sys.executable).parent / 'pyrefly'
@@ -95,8 +80,8 @@ def find_program() -> Path | None:
 
 def run_type_checker(
     program: Path, modules: Mapping[str, str], stubs: Mapping[str, str]
-) -> TypeResult:
-    """Check modules.
+) -> tuple[str, list[TypeReport]]:
+    """Return the version of pyrefly, and what it reports of modules.
 
     Args:
         modules: The source of each, by its path; `stubs` likewise.
@@ -104,9 +89,8 @@ def run_type_checker(
     Raises:
         TypeCheckerError: Pyrefly does not work.
     """
-    version = '.'.join(map(str, sys.version_info[:2]))
     files = {
-        'pyrefly.toml': _SETTINGS.format(version=version),
+        'pyrefly.toml': _SETTINGS.format(version='.'.join(map(str, sys.version_info[:2]))),
         **{f'modules/{path}': text for path, text in modules.items()},
         **{f'stubs/{path}': text for path, text in stubs.items()},
     }
@@ -125,38 +109,8 @@ def run_type_checker(
         message = f'pyrefly does not work: it printed {text.strip()[-200:]!r}'
         raise TypeCheckerError(message) from error
     keys = ('path', 'line', 'column', 'name', 'description')
-    return TypeResult(
-        _run(program, ['--version']).strip().removeprefix('pyrefly '),
-        tuple(TypeReport(*(report[key] for key in keys)) for report in reports),
-    )
-
-
-def load_result(digest: str) -> TypeResult | None:
-    """Return the result that was kept for a digest, if there is one."""
-    try:
-        version, reports, is_clean = json.loads(_place_of(digest).read_bytes())
-        return TypeResult(version, tuple(TypeReport(*report) for report in reports), is_clean)
-    except (OSError, ValueError, TypeError):
-        return None
-
-
-def keep_result(digest: str, result: TypeResult) -> None:
-    """Keep a result; where nothing can be written, the next run is like the first."""
-    place = _place_of(digest)
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile('w', dir=place.parent, delete=False) as file:
-            json.dump(result, file)
-        Path(file.name).replace(place)
-        results = sorted(place.parent.glob('*.json'), key=lambda path: path.stat().st_mtime)
-        for path in results[:-_MOST_KEPT]:
-            path.unlink(missing_ok=True)
-    except OSError:
-        return
-
-
-def _place_of(digest: str) -> Path:
-    return find_cache().parent / 'types' / f'{digest}.json'
+    version = _run(program, ['--version']).strip().removeprefix('pyrefly ')
+    return version, [TypeReport(*(report[key] for key in keys)) for report in reports]
 
 
 def _run(program: Path, arguments: list[str], folder: Path | None = None) -> str:

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import NodeSpec
-    from composer.stubs.checking.type_checker import TypeResult
     from composer.stubs.project_modules import ProjectModule
 
 _CLASS = re.compile(r'^class (\w+)', re.MULTILINE)
@@ -39,18 +38,9 @@ _MOST_NAMED = 3
 
 
 def find_type_errors(
-    program: Path,
-    context: CheckContext,
-    modules: dict[str, ProjectModule],
-    result: TypeResult | None,
-    found: list[Diagnostic],
-) -> tuple[list[Diagnostic], TypeResult]:
-    """Return what is wrong where the other checks found nothing, and the result of pyrefly.
-
-    Args:
-        modules: Those of the project.
-        result: That of an earlier run over the same; `None` if there is none.
-        found: What the other checks found.
+    program: Path, context: CheckContext, modules: dict[str, ProjectModule]
+) -> tuple[str, list[tuple[Diagnostic, range]]]:
+    """Return the version of pyrefly, and findings with the lines of the statements they are in.
 
     Raises:
         TypeCheckerError: Pyrefly does not work.
@@ -60,9 +50,8 @@ def find_type_errors(
     copies = {module.path: annotator.copy(module) for module in modules.values()}
     files = dict(write_messages(context, modules))
     files |= classes.files() | stand_ins(context.spec.qos)
-    if result is None:
-        texts = {path: copy.text for path, copy in copies.items()}
-        result = run_type_checker(program, texts, files)
+    texts = {path: copy.text for path, copy in copies.items()}
+    version, reports = run_type_checker(program, texts, files)
     own, defined = _own_names(modules)
     findings = TypeFindings(
         context,
@@ -74,23 +63,11 @@ def find_type_errors(
         frozenset(modules),
         defined,
     )
-    every, kept = [], []
-    for path, copy in copies.items():
-        name = copy.module.source.source.name
-        # The lines in which the other checks found something.
-        told = {
-            span.line
-            for finding in found
-            for span in (finding.span, *(related.span for related in finding.related))
-            if span is not None and span.source.name == name
-        }
-        reports = [report for report in result.reports if report.path == path]
-        for finding, lines in findings.explain_all(copy, reports):
-            every.append(finding)
-            if not told & {*lines}:
-                told.add(lines[0])
-                kept.append(finding)
-    return kept, result._replace(is_clean=not every)
+    return version, [
+        finding
+        for path, copy in copies.items()
+        for finding in findings.explain_all(copy, [each for each in reports if each.path == path])
+    ]
 
 
 @dataclass(slots=True)
@@ -127,7 +104,7 @@ class _Classes:
     def files(self) -> dict[str, str]:
         """Return the stub with the classes that were asked for, by its path."""
         classes = self.shapes_by_name()
-        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes, self.nodes))
+        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes))
         return {f'{SUPPORT}/{self.module}.pyi': text}
 
 
