@@ -62,14 +62,12 @@ class Mentions:
     """What code may use.
 
     Attributes:
-        names: The names that it may use, of whatever kind.
+        names: Its texts, the attributes that it names, and the globals that it stores.
         open_kinds: The kinds of which it may use any.
-        attributes: Attributes of something that it names, and globals that it stores.
     """
 
     names: set[str] = field(default_factory=set)
     open_kinds: set[str] = field(default_factory=set)
-    attributes: set[str] = field(default_factory=set)
 
 
 class BehaviourReader:
@@ -112,7 +110,6 @@ class BehaviourReader:
                 self._mentions[key] = _find_mentions(module, self._followed)
             found.names |= self._mentions[key].names
             found.open_kinds |= self._mentions[key].open_kinds
-            found.attributes |= self._mentions[key].attributes
         return found
 
     def _read_anew(self, binding: Binding, wire: Wire) -> Reading:
@@ -292,22 +289,23 @@ def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
     found = Mentions()
     plain: set[int] = set()
     for node in _unread(module, followed):
-        if isinstance(node, ast.Attribute):
-            found.attributes.add(node.attr)
-        elif isinstance(node, ast.Global):
-            found.attributes.update(node.names)
         match node:
             case ast.Constant(value=str(text)):
                 found.names.add(text)
-            case ast.Attribute(value=ast.Attribute(attr='parameters') as parameters, attr=name):
-                plain.add(id(parameters))
+            case ast.Global(names=names):
+                found.names.update(names)
+            case ast.Attribute(attr=name):
                 found.names.add(name)
-            case ast.Subscript(
-                value=ast.Attribute(attr='parameters') as parameters, slice=ast.Constant()
+                if name == 'parameters' and id(node) not in plain:
+                    found.open_kinds.add('parameter')
+        match node:
+            case (
+                ast.Attribute(value=ast.Attribute(attr='parameters') as parameters)
+                | ast.Subscript(
+                    value=ast.Attribute(attr='parameters') as parameters, slice=ast.Constant()
+                )
             ):
                 plain.add(id(parameters))
-            case ast.Attribute(attr='parameters') if id(node) not in plain:
-                found.open_kinds.add('parameter')
             case ast.Call(func=ast.Attribute(attr=method), args=[name, *_]) if (
                 method in SENDING_METHODS
             ):

@@ -88,12 +88,11 @@ def _number(node: ast.expr) -> float:
     return value
 
 
-def number_of(node: ast.expr) -> float | None:
-    """Return the number that an expression is, if its text alone shows it."""
-    try:
-        return _number(node)
-    except NotLiteralError:
-        return None
+def shown_value(node: ast.expr) -> object:
+    """Return the value of an expression; `None` as well if its text alone does not show it."""
+    with suppress(NotLiteralError):
+        return literal_of(node)
+    return None
 
 
 def find_problems(
@@ -233,17 +232,17 @@ def _wrong_index(array: FieldType, name: str, use: MessageUse) -> Problem | None
 
 def _never_equal(field_type: FieldType, use: MessageUse) -> Problem | None:
     """Return that a field is compared with a constant of a type that it never has."""
-    constant = use.compared.comparators[0] if use.compared else None
-    if use.compared is None or not isinstance(constant, ast.Constant) or field_type.array:
-        return None
-    own = _PYTHON_TYPES.get(field_type.kind, int)
-    other = type(constant.value)
-    if other not in (bool, int, float, str, bytes) or {own, other} <= {bool, int, float}:
-        return None
-    if own is other:
-        return None
-    text = f'values of these types are never equal: {own.__name__} and {other.__name__}'
-    return Problem('never-equal', text, use.module.span_of(use.compared))
+    match use.compared:
+        case ast.Compare(comparators=[ast.Constant(value=value)]) as compared if (
+            value is not None and value is not ... and not field_type.array
+        ):
+            own, other = _PYTHON_TYPES.get(field_type.kind, int), type(value)
+            if own is not other and not {own, other} <= {bool, int, float}:
+                text = (
+                    f'values of these types are never equal: {own.__name__} and {other.__name__}'
+                )
+                return Problem('never-equal', text, use.module.span_of(compared))
+    return None
 
 
 def explain_unknown(

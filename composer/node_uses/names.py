@@ -8,7 +8,8 @@ from __future__ import annotations
 import ast
 import builtins
 import sys
-from functools import cache, cached_property
+from functools import cache, cached_property, reduce
+from itertools import takewhile
 from typing import TYPE_CHECKING, TypeAlias, TypeGuard
 
 from composer.python_source.annotations import find_interface
@@ -204,11 +205,6 @@ class Names:
         """Return the name of a module that was found."""
         return self._module_names.get(id(module), '')
 
-    def module_of(self, node: ast.expr, scope: Scope) -> ModuleSource | None:
-        """Return the module of the project that an expression is."""
-        value = self.value_of(node, scope)
-        return value.source if isinstance(value, Module) else None
-
     def origin_of(self, module: ModuleSource, name: str) -> tuple[ModuleSource | None, str]:
         """Return the module of the project that stores a name which this one has or imports."""
         for _ in range(_MOST_STEPS):
@@ -285,11 +281,8 @@ class Names:
         if not is_item:
             return self.value_of(expression, scope)
         if isinstance(expression, ast.Tuple | ast.List):
-            found: Value | None = None
-            for position, each in enumerate(expression.elts):
-                value = self.value_of(each, scope)
-                found = _either(found, value) if position else value
-            return found
+            values = [self.value_of(item, scope) for item in expression.elts]
+            return reduce(_either, values) if values else None
         value = self.value_of(expression, scope)
         return Chain((*value.path, '[]')) if _is_of_message(value) else None
 
@@ -411,11 +404,8 @@ class Names:
 
     def bind(self, function: Function, call: ast.Call, scope: Scope) -> dict[str, Value | None]:
         """Return what the parameters of a function stand for in a call, without its `self`."""
-        pairs: list[tuple[str, ast.expr]] = []
-        for name, value in zip(function.parameters, call.args, strict=False):
-            if isinstance(value, ast.Starred):
-                break
-            pairs.append((name, value))
+        plain = takewhile(lambda value: not isinstance(value, ast.Starred), call.args)
+        pairs = list(zip(function.parameters, plain, strict=False))
         pairs += [(each.arg, each.value) for each in call.keywords if each.arg]
         return {name: self.value_of(node, scope) for name, node in pairs}
 

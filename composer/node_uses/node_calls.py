@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from composer.entity_kinds import KIND_OF_NOUN
-from composer.node_uses.message_uses import NotLiteralError, literal_of
+from composer.node_uses.message_uses import shown_value
 from composer.node_uses.names import Chain, External, Function, Texts, only_text
 from composer.node_uses.reading import (
     CREATING_METHODS,
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     import inspect
     from collections.abc import Iterator, Mapping
 
-    from composer.node_uses.current_run import Run
     from composer.node_uses.names import Scope, Value
-    from composer.node_uses.reading import Waited
+    from composer.node_uses.reading import Run, Waited
 
 # A test holds these against `composer.Node`.
 _SIGNATURES = {
@@ -50,13 +49,7 @@ _SIGNATURES = {
 NODE_METHODS = frozenset(_SIGNATURES)
 # What behaviours write for what rclpy's node has.
 OF_RCLPY = {
-    **{
-        name: f'write node.{name}'
-        for name in (
-            *('create_client', 'create_publisher', 'create_service', 'create_subscription'),
-            'create_timer',
-        )
-    },
+    **{name: f'write node.{name}' for name in CREATING_METHODS},
     'declare_parameter': "declare it under 'parameters:' of the node",
     'get_clock': 'write node.now()',
     'get_logger': 'write node.logger',
@@ -174,10 +167,7 @@ def _check_options(run: Run, noun: str, arguments: Mapping[str, ast.expr], scope
     for name, node in arguments.items():
         if name in own:
             continue
-        try:
-            value = literal_of(node)
-        except NotLiteralError:
-            value = None
+        value = shown_value(node)
         entity = {**kind.stand_in, name: value}
         problem = find_problem({'nodes': {'node': {kind.section: {'created': entity}}}})
         if problem and (value is not None or problem.startswith('unknown key')):
@@ -207,10 +197,7 @@ def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> N
         pairs = [(each, each) for each in given.elts]
     for key, value in pairs:
         if isinstance(key, ast.Constant) and isinstance(key.value, str):
-            try:
-                known = literal_of(value) if value is not key else None
-            except NotLiteralError:
-                known = None
+            known = shown_value(value) if value is not key else None
             name, place = key.value, scope.module.span_of(key, key.value)
             told = (name, place, known, scope.module.span_of(value))
             remote = RemoteParameter(text, module.span_of(node, text), *told)

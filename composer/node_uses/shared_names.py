@@ -11,7 +11,16 @@ import ast
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.node_uses.names import Class, External, Function, Instance, Made, Names, Scope
+from composer.node_uses.names import (
+    Class,
+    External,
+    Function,
+    Instance,
+    Made,
+    Module,
+    Names,
+    Scope,
+)
 from composer.node_uses.waiting import FILLING
 from composer.python_source.modules import MOST_BASES
 from composer.python_source.syntax import list_nodes, words_in
@@ -119,8 +128,9 @@ class SharedNames:
             case Instance() if isinstance(node.value, ast.Name):
                 shared = self._shared(node.value, scope)
                 return (shared[0], f'{shared[1]}.{node.attr}') if shared else None
-        home = self._names.module_of(node.value, scope)
-        return self._of_module(home, node.attr) if home is not None else None
+            case Module(source=home):
+                return self._of_module(home, node.attr)
+        return None
 
     def _of_module(self, module: ModuleSource, name: str) -> SharedName | None:
         for _ in range(MOST_BASES):

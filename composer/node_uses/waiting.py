@@ -5,14 +5,14 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
-from composer.node_uses.message_uses import number_of
+from composer.node_uses.message_uses import shown_value
 from composer.node_uses.names import Chain, External, Made
 from composer.node_uses.reading import Awaited, Block
 from composer.python_source.syntax import own_nodes
 
 if TYPE_CHECKING:
-    from composer.node_uses.current_run import Run
     from composer.node_uses.names import Scope
+    from composer.node_uses.reading import Run
 
 _PUTTING = frozenset({'put', 'put_nowait'})
 QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
@@ -112,8 +112,8 @@ def take(run: Run, lock: Made, node: ast.expr, scope: Scope) -> None:
 
 def note_sleep(run: Run, seconds: ast.expr, node: ast.expr, scope: Scope) -> None:
     """Note how long the behaviour sleeps."""
-    number = number_of(_meant(run, seconds, scope))
-    if number is not None and scope.waits and not run.doubts:
+    number = shown_value(_meant(run, seconds, scope))
+    if isinstance(number, int | float) and scope.waits and not run.doubts:
         run.reading.sleeps.append((float(number), scope.module.span_of(node)))
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
-from composer.node_uses.current_run import Run
 from composer.node_uses.names import (
     Chain,
     Class,
@@ -31,6 +30,7 @@ from composer.node_uses.reading import (
     NodeUse,
     Passed,
     Payload,
+    Run,
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind
@@ -751,8 +751,7 @@ class Walk:
         is_write = not isinstance(getattr(node, 'ctx', None), ast.Load)
         of_type = chain.path[1] if chain.path[0] == 'made' else None
         path = chain.path[2 if of_type else 1 :]
-        is_patched = bool(scope.module.top.patched & {*path})
-        is_guarded = run.guards or run.broad_guards or run.fixed or is_patched
+        is_guarded = run.guards or run.broad_guards or run.fixed
         if path and (is_write or not is_guarded):
             value, certain = self._stored.get(id(node)), not run.doubts
             use = MessageUse(path, node, scope.module, is_write, compared, certain, of_type, value)

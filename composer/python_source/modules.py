@@ -124,12 +124,6 @@ class TopNames:
         return frozenset(found)
 
     @cached_property
-    def patched(self) -> frozenset[str]:
-        """Names of attributes that the module itself stores in something, and `setattr` does."""
-        body = [each for each in self._body if not isinstance(each, _BINDING)]
-        return frozenset(_stored_attributes(list_nodes(body))) - {''}
-
-    @cached_property
     def stored_attributes(self) -> Counter[str]:
         """How often code stores attributes, by their names; empty for one that is computed."""
         return _stored_attributes(self._nodes)

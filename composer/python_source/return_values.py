@@ -205,8 +205,13 @@ class _Ways:
         is_single = isinstance(last.pattern, ast.MatchValue | ast.MatchSingleton) and not others
         is_open = len(tests) == len(node.cases) and all(map(self._is_one_text, tests))
         is_past = is_open or (is_single and not self._is_tested(node.subject, tested))
-        if _takes_all(last.pattern) and last.guard is None:
-            return _join(*ends)
+        match last:
+            case ast.match_case(
+                pattern=ast.MatchAs(pattern=None)
+                | ast.MatchOr(patterns=[*_, ast.MatchAs(pattern=None)]),
+                guard=None,
+            ):
+                return _join(*ends)
         return _join(*ends, within if is_past or not self._is_certain else None)
 
     def _past_try(self, node: ast.Try | ast.TryStar, tested: frozenset[str]) -> _Tested:
@@ -321,11 +326,3 @@ def _join(*ends: _Tested) -> _Tested:
     """Return what was tested on any of several ways; `None` if there is no way."""
     ways = [end for end in ends if end is not None]
     return frozenset().union(*ways) if ways else None
-
-
-def _takes_all(pattern: ast.pattern) -> bool:
-    if isinstance(pattern, ast.MatchOr):
-        return any(map(_takes_all, pattern.patterns))
-    return isinstance(pattern, ast.MatchAs) and (
-        pattern.pattern is None or _takes_all(pattern.pattern)
-    )

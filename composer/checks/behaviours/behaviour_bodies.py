@@ -200,7 +200,7 @@ class _Body:
         known = set(node.state).union(*(reading.state_set for reading in readings))
         tested = set().union(*(reading.state_tested for reading in readings))
         used = tested.union(*({use.name for use in each.state_read} for each in readings))
-        mentioned = self.context.behaviours.mentions(self.reading).attributes
+        mentioned = self.context.behaviours.mentions(self.reading).names
         for name, place in self.reading.state_set.items():
             near = find_nearest(name, node.state)
             # One that is set for nobody may be meant to be a declared one.

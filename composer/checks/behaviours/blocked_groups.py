@@ -88,7 +88,7 @@ def _find_fillers(
     is_beside = any(False in reading.fills.get(what, ()) for _, _, reading in fillers)
     names: AbstractSet[str] = FILLING.get(what.kind) or {what.name}
     for _, _, reading in several:
-        if names & context.behaviours.mentions(reading).attributes:
+        if names & context.behaviours.mentions(reading).names:
             return []
     return [] if is_beside or not any(what in each[2].fills for each in fillers) else fillers
 
