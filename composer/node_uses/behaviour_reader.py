@@ -294,9 +294,9 @@ def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
                 found.names.add(text)
             case ast.Global(names=names):
                 found.names.update(names)
-            case ast.Attribute(attr=name):
-                found.names.add(name)
-                if name == 'parameters' and id(node) not in plain:
+            case ast.Attribute(attr=attribute):
+                found.names.add(attribute)
+                if attribute == 'parameters' and id(node) not in plain:
                     found.open_kinds.add('parameter')
         match node:
             case (

@@ -154,9 +154,8 @@ class Scope:
 # The classes whose objects threads wait for.
 _MADE = frozenset(
     {
-        *(f'threading.{each}' for each in ('Barrier', 'Condition', 'Event', 'Lock', 'Semaphore')),
+        *(f'threading.{each}' for each in ('Condition', 'Event', 'Lock', 'Thread')),
         *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
-        *('threading.Thread', 'concurrent.futures.Future'),
     }
 )
 _INSTALLED = {'site-packages', 'dist-packages'}
@@ -204,20 +203,6 @@ class Names:
     def name_of(self, module: ModuleSource) -> str:
         """Return the name of a module that was found."""
         return self._module_names.get(id(module), '')
-
-    def origin_of(self, module: ModuleSource, name: str) -> tuple[ModuleSource | None, str]:
-        """Return the module of the project that stores a name which this one has or imports."""
-        for _ in range(_MOST_STEPS):
-            statements = module.top.statements.get(name, [])
-            if not statements or not isinstance(statements[0][0], ast.Import | ast.ImportFrom):
-                return (module, name) if statements else (None, name)
-            full_name = self._full_name(module, statements[0][0], name)
-            home, _, name = full_name.rpartition('.')
-            found = self.find_module(home)
-            if found is None:
-                break
-            module = found
-        return None, name
 
     def alias_of(self, name: str, scope: Scope) -> ast.AST | None:
         """Return what a function assigns to a name, where it does once."""
@@ -316,14 +301,14 @@ class Names:
             case ast.ClassDef():
                 return Class(module, statement)
             case ast.Import() | ast.ImportFrom():
-                return self._imported(self._full_name(module, statement, name))
+                return self._imported(self.full_name(module, statement, name))
         for target, value, is_item in assignments(statement):
             is_changed = name in module.top.stored_again and isinstance(value, ast.Constant)
             if isinstance(target, ast.Name) and target.id == name and not is_item:
                 return None if is_changed else self.value_of(value, Scope(module))
         return None
 
-    def _full_name(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
+    def full_name(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
         """Return the full name of what an import stores under a name; empty if unknown."""
         own = self.name_of(module)
         return dict(imported_names(statement, own, is_package=module.is_package)).get(name, '')
@@ -411,8 +396,8 @@ class Names:
 
     def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
         match self.value_of(call.func, scope):
-            case External(name=name) if (kind := name.replace('.Bounded', '.')) in _MADE:
-                return Made(kind, scope.module, call)
+            case External(name=name) if name in _MADE:
+                return Made(name, scope.module, call)
             case External(name=name) if (interface := find_interface(name)) is not None:
                 return Chain(('made', interface))
             case Class() as of:

@@ -22,7 +22,6 @@ from composer.node_uses.names import (
     Scope,
 )
 from composer.node_uses.waiting import FILLING
-from composer.python_source.modules import MOST_BASES
 from composer.python_source.syntax import list_nodes, words_in
 
 if TYPE_CHECKING:
@@ -35,6 +34,8 @@ SharedName: TypeAlias = tuple[str, str]
 _ASSIGNING = (ast.Assign, ast.AnnAssign)
 # A behaviour that calls more is too large to follow.
 _MOST_FUNCTIONS = 200
+# Longer ways from a name to its object are not followed.
+_MOST_STEPS = 20
 # Methods of containers that change them.
 _CHANGING = frozenset(
     {
@@ -133,16 +134,20 @@ class SharedNames:
         return None
 
     def _of_module(self, module: ModuleSource, name: str) -> SharedName | None:
-        for _ in range(MOST_BASES):
-            home, name = self._names.origin_of(module, name)
-            if home is None:
-                return None
-            match home.top.statements.get(name):
+        for _ in range(_MOST_STEPS):
+            match module.top.statements.get(name):
+                case [(ast.Import() | ast.ImportFrom() as statement, _), *_]:
+                    full_name = self._names.full_name(module, statement, name)
+                    owner, _, name = full_name.rpartition('.')
+                    home = self._names.find_module(owner)
+                    if home is None:
+                        return None
+                    module = home
                 case [(ast.Assign(value=ast.Name(id=other)), _)]:
                     # The same object by another name.
-                    module, name = home, other
+                    name = other
                 case [(ast.Assign() | ast.AnnAssign(), _), *_]:
-                    return self._names.name_of(home), name
+                    return self._names.name_of(module), name
                 case _:
                     return None
         return None

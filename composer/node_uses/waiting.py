@@ -14,39 +14,29 @@ if TYPE_CHECKING:
     from composer.node_uses.names import Scope
     from composer.node_uses.reading import Run
 
-_PUTTING = frozenset({'put', 'put_nowait'})
 QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
 # The methods that wait for something, by the class; and those that bring it about.
 WAITING: dict[str, frozenset[str]] = {
     'threading.Event': frozenset({'wait'}),
     'threading.Condition': frozenset({'wait', 'wait_for'}),
-    'threading.Barrier': frozenset({'wait'}),
-    'threading.Semaphore': frozenset({'acquire'}),
     **dict.fromkeys(QUEUES, frozenset({'get'})),
-    'concurrent.futures.Future': frozenset({'result', 'exception'}),
 }
 FILLING: dict[str, frozenset[str]] = {
     'threading.Event': frozenset({'set'}),
     'threading.Condition': frozenset({'notify', 'notify_all'}),
-    'threading.Barrier': frozenset({'wait', 'abort'}),
-    'threading.Semaphore': frozenset({'release'}),
-    **dict.fromkeys(QUEUES, _PUTTING),
-    'concurrent.futures.Future': frozenset({'cancel', 'set_exception', 'set_result'}),
+    **dict.fromkeys(QUEUES, frozenset({'put', 'put_nowait'})),
 }
 LOCK, THREAD = 'threading.Lock', 'threading.Thread'
 # Methods after which a wait is as before.
-_HARMLESS = frozenset({'clear', 'reset', 'task_done', 'acquire', 'release'})
-_ASKING = frozenset({'done', 'empty', 'full', 'is_set', 'qsize'})
+_HARMLESS = frozenset({'clear', 'task_done', 'acquire', 'release'})
+_ASKING = frozenset({'empty', 'full', 'is_set', 'qsize'})
 _CLOCKS = frozenset({'time.monotonic', 'time.perf_counter', 'time.time'})
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
 
 
 def note_method(run: Run, owner: Made, call: ast.Call, name: str, scope: Scope) -> None:
     """Note a call of a method of something that threads wait for."""
-    if owner.kind == LOCK and name == 'acquire' and not (call.args or call.keywords):
-        take(run, owner, call, scope)
-        run.held_locks.append((owner, call.lineno))
-    elif owner.kind == LOCK and name in ('acquire', 'release'):
+    if owner.kind == LOCK and name in ('acquire', 'release'):
         run.held_locks = [each for each in run.held_locks if each[0] != owner]
     elif owner.kind in WAITING:
         place = owner.module.span_of(owner.node)
@@ -83,12 +73,11 @@ def _is_timed(name: str, call: ast.Call) -> bool:
     keywords = {each.arg: each.value for each in call.keywords}
     if None in keywords or any(isinstance(each, ast.Starred) for each in call.args):
         return True
-    is_taking = name in ('get', 'acquire')
-    blocks = keywords.pop('block', keywords.pop('blocking', call.args[0] if call.args else None))
-    if is_taking and blocks is not None:
+    blocks = keywords.get('block', call.args[0] if call.args else None)
+    if name == 'get' and blocks is not None:
         is_true = isinstance(blocks, ast.Constant) and blocks.value is True
-        return not is_true or bool(keywords) or len(call.args) > 1
-    position = 1 if name == 'wait_for' or is_taking else 0
+        return not is_true or 'timeout' in keywords or len(call.args) > 1
+    position = 1 if name in ('wait_for', 'get') else 0
     timeout = keywords.get('timeout', call.args[position] if len(call.args) > position else None)
     return timeout is not None and not (
         isinstance(timeout, ast.Constant) and timeout.value is None
@@ -144,11 +133,12 @@ def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
     elif outs:
         return
     limit = _limit_of(run, test, scope)
-    what = _only_name(run, test, scope)
     if limit is not None:
         note_sleep(run, limit, test, scope)
-    elif what is not None:
-        _block(run, what, scope, test)
+        return
+    match [*_names_in(run, test, scope)]:
+        case [Awaited() as what]:
+            _block(run, what, scope, test)
 
 
 def _limit_of(run: Run, test: ast.expr, scope: Scope) -> ast.expr | None:
@@ -173,27 +163,18 @@ def _is_clock(run: Run, node: ast.expr, scope: Scope) -> bool:
     return isinstance(function, External) and function.name in _CLOCKS
 
 
-def _only_name(run: Run, test: ast.expr, scope: Scope) -> Awaited | None:
-    """Return the one name that others change, and on which alone a condition depends."""
-    found: set[Awaited] = set()
-    pending: list[ast.expr] = [test]
-    while pending:
-        node = pending.pop()
-        match node:
-            case ast.Constant():
-                continue
-            case ast.UnaryOp(operand=operand):
-                pending.append(operand)
-            case ast.Compare(left=left, comparators=others):
-                pending += [left, *others]
-            case ast.Name() | ast.Attribute():
-                what = _changed_name(run, node, scope)
-                if what is None:
-                    return None
-                found.add(what)
-            case _:
-                return None
-    return found.pop() if len(found) == 1 else None
+def _names_in(run: Run, test: ast.expr, scope: Scope) -> set[Awaited | None]:
+    """Return the names that others change, and on which a condition depends; `None` for more."""
+    match test:
+        case ast.Constant():
+            return set()
+        case ast.UnaryOp(operand=operand):
+            return _names_in(run, operand, scope)
+        case ast.Compare(left=left, comparators=others):
+            return set().union(*(_names_in(run, part, scope) for part in (left, *others)))
+        case ast.Name() | ast.Attribute():
+            return {_changed_name(run, test, scope)}
+    return {None}
 
 
 def _changed_name(run: Run, node: ast.Name | ast.Attribute, scope: Scope) -> Awaited | None:

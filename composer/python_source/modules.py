@@ -416,35 +416,34 @@ def _read_constructor(definition: ast.ClassDef) -> inspect.Signature | None:
 
 def read_signature(arguments: ast.arguments) -> inspect.Signature:
     """Return how a function with these parameters is called."""
-    positional = [
-        *((argument, inspect.Parameter.POSITIONAL_ONLY) for argument in arguments.posonlyargs),
-        *((argument, inspect.Parameter.POSITIONAL_OR_KEYWORD) for argument in arguments.args),
-    ]
-    required = len(positional) - len(arguments.defaults)
-    parameters = [
-        _parameter(argument, kind, optional=index >= required)
-        for index, (argument, kind) in enumerate(positional)
-    ]
-    if arguments.vararg:
-        parameters.append(_parameter(arguments.vararg, inspect.Parameter.VAR_POSITIONAL))
-    parameters += [
-        _parameter(argument, inspect.Parameter.KEYWORD_ONLY, optional=default is not None)
-        for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
-    ]
-    if arguments.kwarg:
-        parameters.append(_parameter(arguments.kwarg, inspect.Parameter.VAR_KEYWORD))
-    return inspect.Signature(parameters)
+    positional = [*arguments.posonlyargs, *arguments.args]
+    optional = {*positional[len(positional) - len(arguments.defaults) :]}
+    pairs = zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+    optional |= {argument for argument, default in pairs if default is not None}
+    kinds = (
+        (inspect.Parameter.POSITIONAL_ONLY, arguments.posonlyargs),
+        (inspect.Parameter.POSITIONAL_OR_KEYWORD, arguments.args),
+        (inspect.Parameter.VAR_POSITIONAL, filter(None, [arguments.vararg])),
+        (inspect.Parameter.KEYWORD_ONLY, arguments.kwonlyargs),
+        (inspect.Parameter.VAR_KEYWORD, filter(None, [arguments.kwarg])),
+    )
+    empty = inspect.Parameter.empty
+    return inspect.Signature(
+        [
+            inspect.Parameter(
+                argument.arg,
+                kind,
+                default=... if argument in optional else empty,
+                annotation=_text_of(argument.annotation) or empty,
+            )
+            for kind, of_kind in kinds
+            for argument in of_kind
+        ]
+    )
 
 
-def _parameter(argument: ast.arg, kind: object, *, optional: bool = False) -> inspect.Parameter:
-    default = ... if optional else inspect.Parameter.empty
-    annotation: object = inspect.Parameter.empty
+def _text_of(annotation: ast.expr | None) -> str:
     # One that nests too deep means as much as none.
     with suppress(RecursionError):
-        annotation = ast.unparse(argument.annotation) if argument.annotation else annotation
-    return inspect.Parameter(
-        argument.arg,
-        kind,  # type: ignore[arg-type]
-        default=default,
-        annotation=annotation,
-    )
+        return ast.unparse(annotation) if annotation else ''
+    return ''

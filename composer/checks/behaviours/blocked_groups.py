@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 
 # What brings about what is waited for, by the kind of that.
 _VERBS = {
-    'threading.Barrier': 'comes to',
     'threading.Condition': 'notifies',
-    'threading.Semaphore': 'releases',
     **dict.fromkeys(QUEUES, 'fills'),
 }
 _INSTEAD = 'let a timer do the rest, or a generator, which a timer resumes'
@@ -79,10 +77,7 @@ def _find_fillers(
         several = [each for each in every if each[0] is node]
         if any(reading.is_state_open for _, _, reading in several):
             return []
-    if waiting.reaches_ros or what in waiting.asked:
-        return []
-    # Those who wait at a barrier are those who open it.
-    if what in waiting.fills and what.kind != 'threading.Barrier':
+    if waiting.reaches_ros or what in waiting.asked or what in waiting.fills:
         return []
     fillers = [each for each in several if each is not waiter and _may_fill(each[2], what)]
     is_beside = any(False in reading.fills.get(what, ()) for _, _, reading in fillers)
