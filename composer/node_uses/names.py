@@ -406,8 +406,6 @@ class Names:
                 sent = self.value_of(call.args[0], scope) if call.args else None
                 client = only_text(sent)
                 return None if client is None else Chain(('goal', client))
-            case Chain(path=('node', 'with_own_state')):
-                return Chain(('node',))
         return None
 
 

@@ -24,13 +24,11 @@ _GENERATORS = {'AsyncGenerator', 'AsyncIterable', 'AsyncIterator'} | {
     'Iterable',
     'Iterator',
 }
-_KINDS = ('msg', 'srv', 'action')
-_PARTS = {
-    'srv': {'Request', 'Response'},
-    'action': {'Goal', 'Result', 'Feedback'},
-}
-# `package.kind.Name`
-_LENGTH = 3
+# The classes are in modules with a leading underscore, such as `std_msgs.msg._string`.
+_INTERFACE = re.compile(
+    r'(\w+)\.(msg|srv|action)\.(?:_\w+\.)*([A-Z]\w*)'
+    r'(?:\.(Request|Response|Goal|Result|Feedback))?'
+)
 
 
 @record
@@ -84,16 +82,11 @@ def dotted_name(expression: ast.expr | None) -> str:
 
 def find_interface(name: str) -> str | None:
     """Return the interface of a dotted name, as generated packages name it, or `None`."""
-    # The classes are in modules with a leading underscore, such as `std_msgs.msg._string`.
-    parts = [part for part in name.split('.') if not part.startswith('_')]
-    if len(parts) < _LENGTH or parts[1] not in _KINDS or not parts[2][:1].isupper():
+    match = _INTERFACE.fullmatch(name)
+    if match is None:
         return None
-    full = '/'.join(parts[:_LENGTH])
-    if len(parts) == _LENGTH:
-        return full
-    inner = parts[_LENGTH]
-    is_part = len(parts) == _LENGTH + 1 and inner in _PARTS.get(parts[1], ())
-    return f'{full}_{inner}' if is_part else None
+    *full, part = match.groups()
+    return '/'.join(full) + (f'_{part}' if part else '')
 
 
 # The types of YAML values that fit an annotation.
@@ -159,26 +152,21 @@ def _parse(text: str) -> ast.expr:
 
 
 def _read(expression: ast.expr, value: Any, given: Mapping[str, Any]) -> Iterator[WantedValue]:
+    items: list[ast.expr] = []
     match expression:
         case ast.Constant(value=None):
             return
         case ast.Constant(value=str(text)):
             yield from _read(_parse(text), value, given)
-        case ast.BinOp(op=ast.BitOr()):
-            yield from _read(expression.left, value, given)
-            yield from _read(expression.right, value, given)
-        case ast.Name(id=name) if name in _SCALARS:
-            types = _SCALARS[name]
-            fits = isinstance(value, types) and (bool in types or not isinstance(value, bool))
-            fits |= name == 'int' and isinstance(value, float) and value.is_integer()
-            yield WantedValue(name, fits)
-        case ast.Name(id=name) | ast.Attribute(attr=name) if name in _COLLECTIONS:
-            yield _read_collection(name, [], value, given)
+            return
+        case ast.BinOp(op=ast.BitOr(), left=left, right=right):
+            name, items = 'Union', [left, right]
         case ast.Subscript(value=form, slice=inner):
+            name = dotted_name(form)
             items = inner.elts if isinstance(inner, ast.Tuple) else [inner]
-            yield from _read_form(dotted_name(form).rpartition('.')[2], items, value, given)
         case _:
-            raise _UnknownAnnotationError
+            name = dotted_name(expression)
+    yield from _read_form(name.rpartition('.')[2], items, value, given)
 
 
 def _read_form(
@@ -193,11 +181,16 @@ def _read_form(
         for item in items:
             yield from _read(item, value, given)
     elif name == 'Annotated':
-        bounds = list(_read_bounds(items[1:], given))
+        bounds = list(_read_bounds(items[1:], value, given))
         for wanted in _read(items[0], value, given):
-            holds = not wanted.fits or all(holds(value) for _, holds in bounds)
+            fits = wanted.fits and all(holds for _, holds in bounds)
             text = ' '.join([wanted.text, ' and '.join(text for text, _ in bounds)]).strip()
-            yield WantedValue(text, wanted.fits and holds)
+            yield WantedValue(text, fits)
+    elif name in _SCALARS:
+        types = _SCALARS[name]
+        fits = isinstance(value, types) and (bool in types or not isinstance(value, bool))
+        fits |= name == 'int' and isinstance(value, float) and value.is_integer()
+        yield WantedValue(name, fits)
     elif name in _COLLECTIONS:
         yield _read_collection(name, items, value, given)
     else:
@@ -222,8 +215,8 @@ def _read_collection(
 
 
 def _read_bounds(
-    items: list[ast.expr], given: Mapping[str, Any]
-) -> Iterator[tuple[str, Callable[[Any], bool]]]:
+    items: list[ast.expr], value: Any, given: Mapping[str, Any]
+) -> Iterator[tuple[str, bool]]:
     for item in items:
         text = item.value if isinstance(item, ast.Constant) else None
         found = _BOUND.fullmatch(text.strip()) if isinstance(text, str) else None
@@ -233,11 +226,7 @@ def _read_bounds(
         limit: Any = float(number) if number else given.get(name)
         if _is_number(limit):
             shown = number or f"'{name}' ({limit})"
-            yield f'{sign} {shown}', _comparison(sign, limit)
-
-
-def _comparison(sign: str, limit: float) -> Callable[[Any], bool]:
-    return lambda value: not _is_number(value) or _COMPARISONS[sign](value, limit)
+            yield f'{sign} {shown}', not _is_number(value) or _COMPARISONS[sign](value, limit)
 
 
 def _is_number(value: object) -> bool:

@@ -215,16 +215,12 @@ class _Ways:
         return _join(*ends, within if is_past or not self._is_certain else None)
 
     def _past_try(self, node: ast.Try | ast.TryStar, tested: frozenset[str]) -> _Tested:
-        bare, self.bare = self.bare, []
         ends = [self.follow(node.orelse, self.follow(node.body, tested))]
         for handler in node.handlers:
             caught = ast.dump(handler.type) if handler.type else ''
             is_rare = self._is_certain and any(name in caught for name in _AT_THE_END)
             ends.append(self.follow(handler.body, None if is_rare else tested))
-        inner, self.bare = self.bare, bare
         is_left = self.follow(node.finalbody, tested) is not None
-        # What `finally` returns replaces what was returned before.
-        self.bare += inner if is_left else []
         return _join(*ends) if is_left else None
 
     def _past_loop(
