@@ -54,6 +54,7 @@ _ANSWERS: dict[str, tuple[set[type], str]] = {
     'on_parameters': ({str, type(None)}, 'None, or why not'),
 }
 
+_TYPES = {ast.Compare: bool, ast.Dict: dict, ast.List: list, ast.JoinedStr: str}
 _FUNCTIONS = (*FUNCTIONS, ast.Lambda)
 
 
@@ -266,18 +267,11 @@ def _is_made_there(node: ast.expr) -> bool:
 
 
 def _type_of(value: ast.expr) -> type | None:
-    match value:
-        case ast.Constant(value=constant):
-            return type(constant)
-        case ast.Compare() | ast.UnaryOp(op=ast.Not()):
-            return bool
-        case ast.Dict():
-            return dict
-        case ast.List():
-            return list
-        case ast.JoinedStr():
-            return str
-    return None
+    if isinstance(value, ast.Constant):
+        return type(value.value)
+    if isinstance(value, ast.UnaryOp) and isinstance(value.op, ast.Not):
+        return bool
+    return _TYPES.get(type(value))
 
 
 def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:

@@ -132,8 +132,8 @@ class _Payloads:
                         yield Problem('unknown-field', str(error), place, error.help)
             case _ if len(fields) == 1:
                 yield from self.field(description, fields[0], value)
-            case ast.Constant(value=bool() | int() | float() | str()):
-                yield from self._literal(description, value, value)
+            case ast.Constant(value=bool() | int() | float() | str() as data):
+                yield from self._literal(description, value, data)
 
     def field(
         self, description: MessageDescription, field: FieldDescription, value: ast.expr
@@ -164,7 +164,6 @@ class _Payloads:
     def _literal(
         self, description: MessageDescription, value: ast.expr, data: object
     ) -> Iterator[Problem]:
-        data = literal_of(value) if data is value else data
         for finding in check_payload(description, data, self._types.catalogue):
             place = self._module.span_of(value)
             message = finding.message.replace(description.name, in_python(description.name))

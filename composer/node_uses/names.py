@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import builtins
 import sys
+from dataclasses import dataclass, field
 from functools import cache, cached_property, reduce
 from itertools import takewhile
 from typing import TYPE_CHECKING, TypeAlias, TypeGuard
@@ -119,30 +120,22 @@ def only_text(value: Value | None) -> str | None:
 Value: TypeAlias = Chain | Texts | Function | Class | Instance | Module | External | Made
 
 
+@dataclass(eq=False)
 class Scope:
     """A function whose code is looked at, or the top of a module.
 
-    Args:
+    Attributes:
         definition: The function; `None` for the top of a module.
         given: What its parameters stand for, as far as that is known.
         outer: The function around it.
         waits: Whether who calls the behaviour waits for it.
     """
 
-    def __init__(
-        self,
-        module: ModuleSource,
-        definition: FunctionNode | ast.Lambda | None = None,
-        given: dict[str, Value] | None = None,
-        outer: Scope | None = None,
-        *,
-        waits: bool = True,
-    ) -> None:
-        self.module = module
-        self.definition = definition
-        self.given = given or {}
-        self.outer = outer
-        self.waits = waits
+    module: ModuleSource
+    definition: FunctionNode | ast.Lambda | None = None
+    given: dict[str, Value] = field(default_factory=dict)
+    outer: Scope | None = None
+    waits: bool = True
 
     @cached_property
     def arguments(self) -> frozenset[str]:

@@ -128,15 +128,6 @@ def _note_sent(
         run.reading.payloads.append(sent)
 
 
-def note_goal(run: Run, chain: Chain, call: ast.Call, scope: Scope, *, is_awaited: bool) -> None:
-    """Note that a behaviour waits for the end of a goal."""
-    match chain.path:
-        case ('goal', name, 'result' | 'result_async' as method):
-            if scope.waits and not run.doubts and (method == 'result' or is_awaited):
-                named = Texts(((name, call, scope.module),))
-                run.use('action client', named, waits='end')
-
-
 def _note_created(
     run: Run, method: str, arguments: Mapping[str, ast.expr], scope: Scope
 ) -> Iterator[tuple[Function, list[Value | None]]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from composer.node_uses.names import (
@@ -58,16 +59,10 @@ class SharedNames:
 
     def __init__(self, finder: ModuleFinder) -> None:
         self._names = Names(finder)
-        self._found: dict[tuple[str, str], NameUses] = {}
-
-    def uses_of(self, module: str, function: str) -> NameUses:
-        """Return what a function, or `Class.method`, reads and changes."""
-        key = (module, function)
-        if key not in self._found:
-            self._found[key] = self._follow(module, function)
-        return self._found[key]
+        self.uses_of = cache(self._follow)
 
     def _follow(self, name: str, function: str) -> NameUses:
+        """Return what a function of a module, or `Class.method`, reads and changes."""
         uses = NameUses()
         module = self._names.find_module(name)
         owner, _, method = function.rpartition('.')

@@ -101,6 +101,7 @@ _CATCHING = frozenset(
         'ValueError',
     }
 )
+_SUPPRESSING = frozenset({'raises', 'suppress'})
 _CATCHING_ALL = frozenset({'BaseException', 'Exception'})
 _DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
 _WITHOUT_EFFECT = (ast.Dict, ast.List, ast.Set, ast.Tuple, ast.Compare, ast.JoinedStr)
@@ -331,12 +332,11 @@ class Walk:
             if item.optional_vars is not None:
                 self.visit(item.optional_vars, scope)
             if isinstance(item.context_expr, ast.Call):
-                func = self._names.value_of(item.context_expr.func, scope)
+                func = item.context_expr.func
+                called = self._names.value_of(func, scope)
                 # One of the project may catch what its body raises.
-                is_guard |= isinstance(func, Class) or bool(
-                    words_in(item.context_expr.func) & {'raises', 'suppress'}
-                )
-                is_guard |= func is None and isinstance(item.context_expr.func, ast.Name)
+                is_guard |= isinstance(called, Class) or bool(words_in(func) & _SUPPRESSING)
+                is_guard |= called is None and isinstance(func, ast.Name)
         with self.run.guard(is_guard=is_guard):
             self._block(node.body, scope)
         self.run.held_locks = held
@@ -819,14 +819,9 @@ class Walk:
             case External(name=name) if (interface := find_interface(name)) is not None:
                 for each in call.keywords:
                     if each.arg and not (self.run.guards or self.run.broad_guards):
+                        path, value, certain = (each.arg,), each.value, not self.run.doubts
                         use = MessageUse(
-                            (each.arg,),
-                            each.value,
-                            scope.module,
-                            is_write=True,
-                            is_certain=not self.run.doubts,
-                            of_type=interface,
-                            value=each.value,
+                            path, value, scope.module, True, None, certain, interface, value
                         )
                         self.run.reading.message_uses.append(use)
             case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):
@@ -902,8 +897,9 @@ class Walk:
             case ('node', 'state', name, method):
                 waiting.note_method_of_state(run, name, call, method, scope)
                 is_noted = False
-            case ('goal', *_):
-                node_calls.note_goal(run, chain, call, scope, is_awaited=is_awaited)
+            case ('goal', name, 'result' | 'result_async' as method):
+                if scope.waits and not run.doubts and (method == 'result' or is_awaited):
+                    run.use('action client', Texts(((name, call, scope.module),)), waits='end')
             case ('message', *path, method):
                 if method in _MUTATORS and path and isinstance(call.func, ast.Attribute):
                     use = MessageUse(tuple(path), call.func.value, scope.module, is_write=True)
@@ -969,10 +965,8 @@ class Walk:
 
 def _prefix(node: ast.expr, name: str) -> ast.expr:
     """Return the part of a chain of attributes that ends with a name."""
-    for each in ast.walk(node):
-        if isinstance(each, ast.Attribute) and each.attr == name:
-            return each
-    return node
+    parts = (part for part in ast.walk(node) if isinstance(part, ast.Attribute))
+    return next((part for part in parts if part.attr == name), node)
 
 
 def _tests_in(definition: ast.AST) -> list[ast.AST]:

@@ -116,7 +116,6 @@ class WantedValue:
     """One of the kinds of value that an annotation allows.
 
     Attributes:
-        text: It in words.
         fits: Whether the value in question is one of these.
         option: The only value of this kind, if it is a text.
     """

@@ -180,14 +180,10 @@ class ModuleSource:
     """The names that a module defines.
 
     Attributes:
-        lines: The lines of its source.
         is_open: Whether it may have further names (star imports, `__getattr__`, no source).
-        syntax_error: The syntax error in its source, or `None`.
         error_line: The line of this error, counted from 1, if it is known.
         unread: Why its source is not read although it may be valid, or `None`.
         tokens: How many words and signs it has.
-        body: Its statements.
-        top: The names that these store.
         content: Its source, if it was read and is valid.
     """
 
