@@ -36,11 +36,7 @@ def is_writable(name: str) -> bool:
 
 
 class StubImports:
-    """The names of other modules that a stub uses; aliases with `_` are not part of its own.
-
-    Args:
-        module: The dotted name of the module that the stub describes.
-    """
+    """The names of other modules that a stub uses; aliases with `_` are not part of its own."""
 
     def __init__(self, module: str) -> None:
         self.module = module
@@ -65,7 +61,7 @@ class StubImports:
         self._lines.add(f'from {module} import {name} as _{name}')
         return f'_{name}'
 
-    def lines(self) -> Iterable[str]:
+    def lines(self) -> list[str]:
         """Return the statements that import all this."""
         return sorted(self._lines)
 
@@ -190,7 +186,10 @@ def write_packages(
         names = [name for kind in _KINDS for name in catalogue.names(kind, package)]
         interfaces = {name: catalogue.describe(name) for name in names}
         if interfaces:
-            pending += _used_packages(interfaces)
+            fields = [field for part in _parts(interfaces) for field in part.fields]
+            pending += [
+                field.type.nested.partition('/')[0] for field in fields if field.type.nested
+            ]
             yield from _write_package(package, interfaces)
 
 
@@ -199,38 +198,26 @@ def _write_package(
 ) -> Iterator[tuple[str, list[str]]]:
     yield f'{package}/__init__.pyi', []
     for kind in _KINDS:
-        of_kind = {
-            name: interfaces[name] for name in interfaces if name.startswith(f'{package}/{kind}/')
-        }
-        if of_kind:
-            lines = [*_write_interfaces(f'{package}.{kind}', of_kind)]
-            yield f'{package}/{kind}/__init__.pyi', lines
-    messages = [
-        message for each in interfaces.values() if each is not None for message in each.parts
-    ]
-    yield f'composer_stubs/payloads/{package}.pyi', [*_write_payloads(package, messages)]
+        imports = StubImports(f'{package}.{kind}')
+        lines = [
+            line
+            for name, interface in interfaces.items()
+            if name.startswith(f'{package}/{kind}/')
+            for line in _write_interface(name, interface, imports)
+        ]
+        if lines:
+            yield f'{package}/{kind}/__init__.pyi', [*imports.lines(), *lines]
+    imports = StubImports(f'{PAYLOADS}.{package}')
+    lines = [line for part in _parts(interfaces) for line in _write_payload(part, imports)]
+    yield f'composer_stubs/payloads/{package}.pyi', [*imports.lines(), *lines]
 
 
-def _used_packages(interfaces: Mapping[str, InterfaceDescription | None]) -> Iterator[str]:
-    parts = (part for each in interfaces.values() if each is not None for part in each.parts)
-    for field in (field for part in parts for field in part.fields):
-        if field.type.nested is not None:
-            yield field.type.nested.partition('/')[0]
-
-
-def _write_interfaces(
-    module: str, interfaces: Mapping[str, InterfaceDescription | None]
-) -> Iterator[str]:
-    """Yield the lines of the stub of a module with interfaces, such as `std_msgs.msg`."""
-    imports = StubImports(module)
-    classes = [
-        line
-        for name, interface in interfaces.items()
-        for line in _write_interface(name, interface, imports)
-    ]
-    imports.take('typing', 'Any')
-    yield from imports.lines()
-    yield from classes
+def _parts(
+    interfaces: Mapping[str, InterfaceDescription | None],
+) -> Iterator[MessageDescription]:
+    """Yield the messages, and those that services and actions have."""
+    for interface in interfaces.values():
+        yield from interface.parts if interface is not None else ()
 
 
 def _write_interface(
@@ -284,20 +271,13 @@ def _last(name: str) -> str:
     return name.rpartition('/')[2]
 
 
-def _write_payloads(package: str, messages: Iterable[MessageDescription]) -> Iterator[str]:
-    """Yield the lines of a stub with what may be given for a package's messages.
+def _write_payload(message: MessageDescription, imports: StubImports) -> Iterator[str]:
+    """Yield the lines with what may be given for a message.
 
-    A payload is a message, a mapping of fields, or the bare value of a message with one field. A
+    That is a message, a mapping of fields, or the bare value of a message with one field. A
     mapping is a `TypedDict`: `Mapping[str, Any]` would take any key. So one that is built in steps
     is declared as the `TypedDict`, or as `Any`.
     """
-    imports = StubImports(f'{PAYLOADS}.{package}')
-    lines = [line for message in messages for line in _write_payload(message, imports)]
-    yield from imports.lines()
-    yield from lines
-
-
-def _write_payload(message: MessageDescription, imports: StubImports) -> Iterator[str]:
     types = FieldTypes(imports, frozenset(field.name for field in message.fields))
     last = _last(message.name)
     message_class = imports.message(message.name)

@@ -231,7 +231,14 @@ def _name_of(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ''
 
 
-_TIMEOUT = 'timeout: float | None = 5.0'
+# Of the methods that send something: the section of what they use, the part of its type that they
+# send, and the parts that answer.
+SENDING = {
+    'publish': ('publishers', '', ()),
+    'call': ('service_clients', '_Request', ('_Response',)),
+    'call_async': ('service_clients', '_Request', ('_Response',)),
+    'send_goal': ('action_clients', '_Goal', ('_Feedback', '_Result')),
+}
 # What a mapping has of its own: `node.parameters.keys` is no parameter.
 _OF_MAPPINGS = frozenset({'get', 'items', 'keys', 'values'})
 # The types of Python that parameters have.
@@ -301,19 +308,12 @@ class _Writer:
         yield f'    parameters: {self.imports.take("typing", "Final")}[{self.name}Parameters]'
         yield from self._property('state', f'{self.name}State')
         yield from self._property('logger', self.imports.support('Logger'))
-        rest = f', {_TIMEOUT}'
-        methods = {
-            'publish': ([self._publish(*publisher) for publisher in shape.publishers], ''),
-            **{
-                each: ([self._call(each, *client) for client in shape.service_clients], rest)
-                for each in ('call', 'call_async')
-            },
-            'send_goal': ([self._send_goal(*client) for client in shape.action_clients], rest),
-        }
-        for method, (lines, rest) in methods.items():
-            yield from _overloaded(self.imports, lines) or [
-                self._method(method, 'Never', 'Never', rest, 'None')
-            ]
+        for method, (section, _, _) in SENDING.items():
+            senders = [self._sender(method, *entity) for entity in getattr(shape, section)]
+            if not senders:
+                never = self.imports.take('typing', 'Never')
+                senders = [self._method(method, never, f'{never} = ...', 'None')]
+            yield from _overloaded(self.imports, senders)
 
     def _property(self, name: str, of_type: str) -> Iterator[str]:
         yield '    @property'
@@ -363,40 +363,26 @@ class _Writer:
         several = [_named(self.imports, each) for each in types]
         return self.imports.take('typing', 'Any') if 'Any' in types else ' | '.join(several)
 
-    def _publish(self, name: str, types: Sequence[str]) -> str:
-        return self._method('publish', self._literal(name), self._payloads(types), '', 'None')
-
-    def _call(self, method: str, name: str, types: Sequence[str]) -> str:
-        requests = self._payloads(types, '_Request')
+    def _sender(self, method: str, name: str, types: Sequence[str]) -> str:
+        """Return a method that sends something, as it is for one name."""
+        _, sent, answered = SENDING[method]
         anything = self.imports.take('typing', 'Any')
-        is_known = len(types) == 1 and types[0]
-        answer = self.imports.message(f'{types[0]}_Response') if is_known else anything
-        rest = f' | None = None, {_TIMEOUT}'
-        return self._method(method, self._literal(name), requests, rest, answer)
+        is_known = '' not in types
+        payloads = [self.imports.payload(f'{each}{sent}') for each in types if is_known]
+        payload = ' | '.join(payloads) or anything
+        answers = [anything for _ in answered]
+        if len(types) == 1 and is_known:
+            answers = [self.imports.message(f'{types[0]}{part}') for part in answered]
+        answer = ', '.join(answers) or 'None'
+        if method == 'send_goal':
+            answer = f'{self.imports.support("Goal")}[{answer}]'
+        payload += '' if method == 'publish' else ' | None = None'
+        return self._method(method, self._literal(name), payload, answer)
 
-    def _send_goal(self, name: str, types: Sequence[str]) -> str:
-        goals = self._payloads(types, '_Goal')
-        anything = self.imports.take('typing', 'Any')
-        parts = [anything, anything]
-        if len(types) == 1:
-            parts = [self.imports.message(f'{types[0]}_{part}') for part in ('Feedback', 'Result')]
-        answer = f'{self.imports.support("Goal")}[{", ".join(parts)}]'
-        rest = f' | None = None, {_TIMEOUT}'
-        return self._method('send_goal', self._literal(name), goals, rest, answer)
-
-    def _method(self, method: str, name: str, payload: str, rest: str, answer: str) -> str:
+    def _method(self, method: str, name: str, payload: str, answer: str) -> str:
         word = 'async def' if method.endswith('_async') else 'def'
-        if name == 'Never':
-            never = self.imports.take('typing', 'Never')
-            name, payload = never, f'{never} = ...'
-        return (
-            f'    {word} {method}(self, name: {name}, payload: {payload}{rest}) -> {answer}: ...'
-        )
-
-    def _payloads(self, types: Sequence[str], part: str = '') -> str:
-        if '' in types:
-            return self.imports.take('typing', 'Any')
-        return ' | '.join(self.imports.payload(f'{each}{part}') for each in types)
+        end = '' if method == 'publish' else ', timeout: float | None = 5.0'
+        return f'    {word} {method}(self, name: {name}, payload: {payload}{end}) -> {answer}: ...'
 
     def _literal(self, name: str) -> str:
         if not name:

@@ -38,6 +38,15 @@ def bound_at(context: CheckContext, binding: Binding) -> Related:
     return context.related_value(binding.behaviour.path, f'{binding.owner} is bound to it here')
 
 
+def readings_of(context: CheckContext, node: NodeSpec) -> list[tuple[Binding, Reading]]:
+    """Return the behaviours of a node that have no error of the file, and what they do."""
+    return [
+        (binding, context.behaviours.read(node, binding))
+        for binding in context.bindings(node)
+        if not context.was_dropped(binding.behaviour.path)
+    ]
+
+
 def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use fields, attributes and names of `node.state` that exist; each place once."""
     bound: dict[str, _Bindings] = {}
@@ -50,11 +59,7 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
             bindings.is_for_something |= binding.key.returned not in (None, PUBLISHED)
     found: dict[tuple[Span | None, str], Diagnostic] = {}
     for node in context.spec.nodes.values():
-        readings = [
-            (binding, context.behaviours.read(node, binding))
-            for binding in context.bindings(node)
-            if not context.was_dropped(binding.behaviour.path)
-        ]
+        readings = readings_of(context, node)
         for binding, reading in readings:
             bindings = bound[binding.behaviour.name]
             for finding in _Body(context, node, binding, reading, readings, bindings).findings():

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
-from composer.checks.behaviours.behaviour_bodies import bound_at
+from composer.checks.behaviours.behaviour_bodies import bound_at, readings_of
 from composer.checks.connections.deadlocks import group_in
 from composer.diagnostics import Related, diagnostic_at
-from composer.language.bindings import node_bindings
 from composer.node_uses.waiting import FILLING, QUEUES
 
 if TYPE_CHECKING:
@@ -32,10 +31,9 @@ _Read: TypeAlias = 'tuple[NodeSpec, Binding, Reading]'
 def check_blocked_groups(context: CheckContext) -> Iterator[Diagnostic]:
     """Check what behaviours wait for in their threads; each place once."""
     every = [
-        (node, binding, context.behaviours.read(node, binding))
+        (node, binding, reading)
         for node in context.spec.nodes.values()
-        for binding in node_bindings(node)
-        if not context.was_dropped(binding.behaviour.path)
+        for binding, reading in readings_of(context, node)
     ]
     found: dict[Span, Diagnostic] = {}
     for waiter in every:

@@ -58,8 +58,6 @@ _CHANGES_THE_SEARCH = re.compile(
 )
 # Each is read as a whole, and a small part of a large project is enough for a system.
 _MOST_MODULES = 50
-# A search asks the file system many times.
-_MOST_SEARCHES = 300
 # Statements after which a function goes on in any case.
 _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
@@ -100,7 +98,6 @@ class _Walk:
     findings: list[Diagnostic] = field(default_factory=list)
     importers: list[_Importer] = field(default_factory=list)
     _visited: set[str] = field(default_factory=set)
-    _searches: int = 0
 
     def visit(self, name: str, binding: Binding) -> None:
         """Check the imports of a module of the project, and of the packages that it is in."""
@@ -138,8 +135,6 @@ class _Walk:
 
     def _check(self, statement: _Import, importer: _Importer) -> list[str]:
         """Check an import; return the modules that it imports."""
-        if self._searches > _MOST_SEARCHES:
-            return []
         if isinstance(statement, ast.Import):
             for alias in statement.names:
                 place = importer.source.span_of(alias, alias.name)
@@ -154,7 +149,7 @@ class _Walk:
             return []
         if not self._check_module(home, importer, place):
             return []
-        aliases = [each for each in statement.names[:_MOST_SEARCHES] if each.name != '*']
+        aliases = [each for each in statement.names if each.name != '*']
         for alias in aliases:
             if self._is_of_project(home) and not self._is_of_interfaces(home):
                 self._check_member(home, alias, importer)
@@ -167,7 +162,6 @@ class _Walk:
         is_loaded = name in sys.modules and not self._is_of_project(name)
         if is_loaded or name in sys.stdlib_module_names:
             return True
-        self._searches += 1
         if modules.has(name):
             return True
         if self._is_of_interfaces(name):

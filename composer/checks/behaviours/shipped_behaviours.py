@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.bindings import Binding
-    from composer.language.specs import BehaviourSpec, NodeSpec, ParameterSpec
+    from composer.language.specs import BehaviourSpec, NodeSpec
     from composer.yaml_text.positions import DataPath
 
 
@@ -135,9 +135,9 @@ def _check_mux(context: CheckContext, node: NodeSpec, binding: Binding) -> Itera
     """The parameter `selected` may be the source, if it has choices."""
     behaviour, parameter = binding.behaviour, node.parameters.get('selected')
     source, choices = behaviour.arguments.get('source'), parameter and parameter.choices
-    if source is None or not parameter or not choices or source in choices:
-        return
-    if _is_known(context, parameter):
+    # A sample may stand for any choice.
+    is_known = source is not None and not context.system.sampled
+    if is_known and parameter and choices and source not in choices:
         yield context.at_value(
             (*behaviour.path[:-1], 'with', 'source'),
             'bad-argument',
@@ -145,15 +145,6 @@ def _check_mux(context: CheckContext, node: NodeSpec, binding: Binding) -> Itera
             help=suggest(source, choices, 'its choices are'),
             related=[context.related(parameter.path, 'the parameter and its choices')],
         )
-
-
-def _is_known(context: CheckContext, parameter: ParameterSpec) -> bool:
-    """Return whether the choices of a parameter do not depend on samples."""
-    path, system = parameter.path, context.system
-    return not any(
-        span in system.sampled and place[: len(path)] == path
-        for place, span in (system.positions.values.items() if system.sampled else ())
-    )
 
 
 def _check_monitor(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from composer.checks.behaviours.behaviour_bodies import bound_at
+from composer.checks.behaviours.behaviour_bodies import bound_at, readings_of
 from composer.checks.parameters import OF_EVERY_NODE
 from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import (
@@ -39,14 +39,7 @@ _ENTITY_DEPTH = 2
 
 def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
     """Behaviours use what their node declares, and use all of it."""
-    uses = {
-        name: [
-            (binding, context.behaviours.read(node, binding))
-            for binding in context.bindings(node)
-            if not context.was_dropped(binding.behaviour.path)
-        ]
-        for name, node in context.spec.nodes.items()
-    }
+    uses = {name: readings_of(context, node) for name, node in context.spec.nodes.items()}
     lost, unused = _lost_by_node(context), context.system.unused
     yield from _check_names(context, uses, lost)
     partial = unused.nodes if unused else {}
@@ -175,6 +168,14 @@ def _check_unused(
     are_read = any(each.reads_others for _, uses in nodes for each in uses)
     unused: dict[Span, Diagnostic] = {}
     used: set[Span] = set()
+
+    def note(path: DataPath, rule: str, text: str, advice: str, *, is_used: bool) -> None:
+        span = context.system.positions.key(path)
+        if is_used:
+            used.add(span)
+        elif span not in unused:
+            unused[span] = context.at_key(path, rule, text, help=advice)
+
     for node, uses in nodes:
         open_kinds = frozenset(kind for each in uses for kind in each.open_kinds)
         # A behaviour may react to changes only, and a node without behaviours has its parameters
@@ -191,26 +192,18 @@ def _check_unused(
         open_kinds |= set().union(*(each.open_kinds for each in mentions))
         for kind in USED_KINDS:
             for name, entity in getattr(node, kind.section).items():
-                span = context.system.positions.key(entity.path)
                 is_used = kind.noun in open_kinds or (kind.noun, name) in names
-                is_used = is_used or name in mentioned
-                if is_used or _is_of_ros(kind.noun, name):
-                    used.add(span)
-                elif span not in unused:
-                    text = f"{kind.noun} '{name}' is declared, and {kind.unused}"
-                    rule, advice = f'unused-{kind.slug}', 'remove it, or use it in a behaviour'
-                    unused[span] = context.at_key(entity.path, rule, text, help=advice)
+                is_used = is_used or name in mentioned or _is_of_ros(kind.noun, name)
+                text = f"{kind.noun} '{name}' is declared, and {kind.unused}"
+                rule, advice = f'unused-{kind.slug}', 'remove it, or use it in a behaviour'
+                note(entity.path, rule, text, advice, is_used=is_used)
         touched = mentioned.union(*({*each.state_set, *each.state_tested} for each in uses))
         touched |= {use.name for each in uses for use in each.state_read}
         is_open = not uses or any(each.is_state_open for each in uses)
         for name in node.state:
             path = (*node.path, 'state', name)
-            span = context.system.positions.key(path)
-            if is_open or name in touched:
-                used.add(span)
-            elif span not in unused:
-                text = f"'{name}' is declared in the state, and no behaviour of the node uses it"
-                unused[span] = context.at_key(path, 'unused-state', text, help='remove it')
+            text = f"'{name}' is declared in the state, and no behaviour of the node uses it"
+            note(path, 'unused-state', text, 'remove it', is_used=is_open or name in touched)
     yield from (finding for span, finding in unused.items() if span not in used)
 
 

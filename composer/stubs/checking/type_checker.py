@@ -40,12 +40,10 @@ bad-argument-type = true
 bad-return = true
 bad-specialization = true
 incompatible-comparison = true
-missing-argument = true
 missing-attribute = true
 no-matching-overload = true
 not-callable = true
 not-iterable = true
-read-only = true
 unexpected-keyword = true
 unsupported-operation = true
 """
@@ -56,13 +54,7 @@ class TypeCheckerError(ComposerError):
 
 
 class TypeReport(NamedTuple):
-    """What pyrefly says about a place.
-
-    Attributes:
-        path: The file, in the folder of modules.
-        line: Counted from 1; columns likewise.
-        kind: Its own name for such errors.
-    """
+    """What pyrefly says about a place of a module; lines and columns count from 1."""
 
     path: str
     line: int

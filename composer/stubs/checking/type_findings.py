@@ -21,11 +21,13 @@ from composer.interfaces.message_types import in_python
 from composer.node_uses.message_uses import explain_unknown
 from composer.node_uses.names import assignments, find_stored
 from composer.node_uses.node_calls import OF_RCLPY
+from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import positional_names, words_in
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
 from composer.stubs.checking.left_alone import ReportedPlace
+from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -75,12 +77,6 @@ _PARTS = {
     'Duration': 'a duration',
 }
 _INTERFACE = re.compile(r'\.(msg|srv|action)\.')
-_SECTIONS = {
-    'publish': ('publishers', 'publisher', ''),
-    'call': ('service_clients', 'service client', '_Request'),
-    'call_async': ('service_clients', 'service client', '_Request'),
-    'send_goal': ('action_clients', 'action client', '_Goal'),
-}
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
@@ -163,8 +159,7 @@ class TypeFindings:
         return diagnostic_at(span, rule, message, help=advice, related=related)
 
     def _use(self, place: ReportedPlace) -> FunctionUse | None:
-        definitions = {id(node) for node in place.around}
-        uses = (use for use in self.functions.values() if id(use.definition) in definitions)
+        uses = (use for use in self.functions.values() if use.definition in place.around)
         return next(uses, None)
 
     def _is_message(self, given: str) -> bool:
@@ -240,7 +235,7 @@ class TypeFindings:
 
     def _unknown_parameter(self, owner: str, name: str, node: ast.expr) -> _Problem:
         message = f"node '{self.nodes[owner][0].name}' declares no parameter '{name}'"
-        known = [each for each, _ in self.shapes[owner].parameters]
+        known = dict(self.shapes[owner].parameters)
         advice = suggest(name, known, None, "declare it under 'parameters:'")
         return node, 'unknown-parameter', message, advice
 
@@ -309,7 +304,7 @@ class TypeFindings:
         given = _TIME.sub(r'\1', given)
         module, _, method = function.rpartition('.')
         owner = module.rpartition('.')[2]
-        is_sent = owner in self.nodes and method in _SECTIONS
+        is_sent = owner in self.nodes and method in SENDING
         if is_sent and parameter in ('', 'name', 'payload'):
             return self._sent(place, owner, method, given)
         if not place.values:
@@ -373,7 +368,8 @@ class TypeFindings:
         name, payload = values.get('name'), values.get('payload')
         if None in keywords or name is None:
             return None
-        section, noun, part = _SECTIONS[method]
+        section, part, _ = SENDING[method]
+        noun = SENDING_METHODS[method]
         known = dict(getattr(self.shapes[owner], section))
         if not isinstance(name, ast.Constant):
             is_swapped = isinstance(payload, ast.Constant) and payload.value in known
@@ -430,10 +426,10 @@ class TypeFindings:
             return None
         match = _DICT.match(given)
         for key, entry in zip(value.keys, value.values, strict=True):
-            name = key.value if isinstance(key, ast.Constant) else ''
-            if not isinstance(name, str) or description.field(name) is None:
+            name = str(getattr(key, 'value', ''))
+            if description.field(name) is None:
                 names = [each.name for each in description.fields]
-                error = unknown_field(in_python(description.name), str(name), names)
+                error = unknown_field(in_python(description.name), name, names)
                 return (key or entry), 'unknown-field', str(error), error.help
             problem = self._entry(description, name, entry, match[1] if match else '')
             if problem:
@@ -445,10 +441,10 @@ class TypeFindings:
     ) -> _Problem | None:
         field = description.field(name)
         of_type = field.type if field else None
-        nested = of_type and of_type.nested and self.context.types.describe(of_type.nested)
-        if nested and isinstance(value, ast.Dict) and of_type and not of_type.array:
-            return self._display(nested, value, given)
         if of_type and isinstance(value, _DISPLAYS) and not of_type.array:
+            nested = of_type.nested and self.context.types.describe(of_type.nested)
+            if nested and isinstance(value, ast.Dict):
+                return self._display(nested, value, given)
             if of_type.nested and (not nested or len(nested.fields) <= 1):
                 return None
             kind = 'dict' if isinstance(value, ast.Dict) else 'list'
