@@ -63,14 +63,9 @@ nodes:
     namespace: /qos
     publishers:
       by_depth: {type: std_msgs/msg/Int32, qos: 7}
-      by_builtin: {type: std_msgs/msg/Int32, qos: sensor_data}
       by_name: {type: std_msgs/msg/Int32, qos: latched}
       by_policies: {type: std_msgs/msg/Int32, qos: {profile: careful, lifespan: 3.5}}
       by_nothing: std_msgs/msg/Int32
-    subscriptions:
-      heard_best_effort:
-        {type: std_msgs/msg/Int32, qos: {reliability: best_effort}, behaviour: 'parts:ignore'}
-      heard_careful: {type: std_msgs/msg/Int32, qos: careful, behaviour: 'parts:ignore'}
     on_start: parts:count
 """
 
@@ -187,19 +182,6 @@ def test_qos_by_policies_starts_from_its_profile_and_differs_where_it_says(publi
     assert profile.lifespan == Duration(seconds=3.5)
     assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
     assert profile.liveliness_lease_duration == Duration(seconds=1.5)
-
-
-def test_qos_of_subscriptions(graph, wait_for):
-    def profile_of(topic):
-        info = wait_for(lambda: graph.get_subscriptions_info_by_topic(topic), topic)
-        return info[0].qos_profile
-
-    assert profile_of('/qos/heard_best_effort').reliability is ReliabilityPolicy.BEST_EFFORT
-    careful = profile_of('/qos/heard_careful')
-    assert careful.durability is DurabilityPolicy.TRANSIENT_LOCAL
-    assert careful.deadline == Duration(seconds=0.5)
-    assert careful.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
-    assert careful.liveliness_lease_duration == Duration(seconds=1.5)
 
 
 def test_depth_is_how_many_messages_a_latched_publisher_keeps(graph, shared_peer, wait_for):

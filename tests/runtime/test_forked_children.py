@@ -11,7 +11,6 @@ import asyncio
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -42,10 +41,6 @@ def fork_and_exit(node):
     if fork('fork_and_exit'):
         raise SystemExit(7)
 
-def fork_and_exit_with_a_word(node):
-    if fork('fork_and_exit_with_a_word'):
-        raise SystemExit('the child goes')
-
 def fork_and_yield(node):
     fork('fork_and_yield')
     yield None
@@ -72,17 +67,6 @@ def run_process(node):
 
 def spawn_process(node):
     run('spawn_process', 'spawn')
-
-def terminate(node):
-    process = multiprocessing.get_context('fork').Process(target=time.sleep, args=(1000,))
-    process.start()
-    process.terminate()
-    process.join()
-    tell('terminate', f'the child ended with {process.exitcode}')
-
-def run_program(node):
-    code = subprocess.call([sys.executable, '-c', 'raise SystemExit(3)'])
-    tell('run_program', f'the child ended with {code}')
 
 def start(node):
     node.state.pid = os.getpid()
@@ -122,13 +106,10 @@ TOLD = {
     'fork_and_return': [f'{ENDS}0'],
     'fork_and_raise': [f'{ENDS}1'],
     'fork_and_exit': [f'{ENDS}7'],
-    'fork_and_exit_with_a_word': [f'{ENDS}1'],
     'fork_and_yield': [f'{ENDS}0'],
     'fork_and_await': [f'{ENDS}0', 'after the wait'],
     'run_process': ['in a process', f'{ENDS}0'],
     'spawn_process': ['in a process', f'{ENDS}0'],
-    'terminate': [f'{ENDS}-15'],
-    'run_program': [f'{ENDS}3'],
 }
 
 
@@ -157,7 +138,6 @@ def test_the_children_of_behaviours_end_with_them_and_the_system_misses_nothing(
     assert child.matching('from the child')
     assert child.matching('ValueError: in the child')
     assert not child.matching('raised ValueError')
-    assert child.matching('the child goes')
 
 
 def test_what_is_in_the_buffers_is_written_once(compose):

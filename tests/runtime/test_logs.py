@@ -23,11 +23,8 @@ processes:
     [
         ('debug', '{command: [x]}', None),
         ('listener:=debug', '{command: [x]}', None),
-        ('/robot/arm/talker:=debug', '{command: [x]}', None),
         ('robot.arm.talker.part:=debug', '{command: [x]}', None),
-        ('robot.arm:=debug', '{command: [x]}', None),
         ('composer:=debug', '{command: [x]}', None),
-        ('rclpy.executors:=debug', '{command: [x]}', None),
         ('listner:=debug', '{command: [x]}', "did you mean 'listener'?"),
         ('/nonode:=debug', '{command: [x]}', 'there are: listener, robot.arm.talker'),
         ('nonode:=debug', '{package: cameras, executable: driver}', None),

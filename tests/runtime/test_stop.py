@@ -36,24 +36,11 @@ def stubborn(node):
         except GeneratorExit:
             pass
 
-def slow_end(node):
-    try:
-        while True:  # composer: ignore[endless-loop]
-            node.logger.info('walking')
-            yield
-    finally:
-        time.sleep(1000)
-
 def fail(node):
     raise RuntimeError('out of order')
 
 def stop(node):
     node.logger.info('stop')
-
-def spin(node):
-    node.logger.info('spinning')
-    while True:  # composer: ignore[endless-loop]
-        pass
 
 def hold_interpreter(node):
     node.logger.info('holding')
@@ -61,28 +48,9 @@ def hold_interpreter(node):
 """
 
 
-def system(*behaviours, fails=False, timeout=30.0):
-    """Return a system with a node for each behaviour of a timer, with its name."""
-    failing = "fail: {period: 0.3, behaviour: 'parts:fail', on_error: restart}" if fails else ''
-    nodes = '\n'.join(
-        f"""
-          {behaviour}:
-            on_stop: parts:stop
-            timers:
-              walk: {{period: 0.02, behaviour: 'parts:{behaviour}'}}
-              {failing}
-"""
-        for behaviour in behaviours
-    )
-    return f"""
-        version: 1
-        executor: {{shutdown_timeout: {timeout}}}
-        nodes:
-{nodes}
-    """
-
-
-WALKERS = ('walk', 'walk_async')
+WALKERS = ('walk', 'walk_async', 'stubborn')
+WALKING = "walk: {{period: 0.02, behaviour: 'parts:{name}'}}"
+FAILING = "fail: {period: 0.3, behaviour: 'parts:fail', on_error: restart}"
 
 
 def told_by(child, node):
@@ -93,49 +61,28 @@ def told_by(child, node):
     ]
 
 
-def test_generators_of_timers_are_closed_before_on_stop(compose):
-    child = compose(system(*WALKERS), CODE)
-    for node in WALKERS:
-        child.wait_for_line(f'[{node}]: walking', times=2)
+def test_generators_of_timers_are_closed_before_on_stop_and_before_a_restart(compose):
+    nodes = ''.join(
+        f"""
+  {name}:
+    on_stop: parts:stop
+    timers:
+      {WALKING.format(name=name)}
+      {FAILING if name == 'walk' else ''}
+"""
+        for name in WALKERS
+    )
+    child = compose(f'version: 1\nnodes:\n{nodes}', CODE)
+    for name in ('walk_async', 'stubborn'):
+        child.wait_for_line(f'[{name}]: walking', times=2)
+    child.wait_for_line("node 'walk' was restarted", times=2)
     assert child.stop() == 0
 
-    for node in WALKERS:
-        assert told_by(child, node) == ['closed', 'stop']
-        assert child.matching(f'[{node}]: ')[-2:] == [
-            f'[INFO] [{node}]: closed',
-            f'[INFO] [{node}]: stop',
-        ]
-
-
-def test_generators_of_timers_are_closed_before_a_restart(compose):
-    child = compose(system(*WALKERS, fails=True), CODE)
-    for node in WALKERS:
-        child.wait_for_line(f"node '{node}' was restarted", times=2)
-    closed = {node: told_by(child, node) for node in WALKERS}
-    child.stop()
-
-    for node in WALKERS:
-        assert closed[node][:4] == ['closed', 'stop', 'closed', 'stop']
-
-
-def test_a_generator_that_does_not_let_itself_be_closed_is_an_error(compose):
-    child = compose(system('stubborn'), CODE)
-    child.wait_for_line('walking')
-    assert child.stop() == 0
-
-    assert child.matching("timer 'walk' (system.yaml:9) raised RuntimeError: generator ignored")
-    assert child.lines[-1] == '[INFO] [stubborn]: stop'
-
-
-def test_a_stop_ends_in_time_with_the_stacks_of_what_does_not(compose):
-    child = compose(system('slow_end', 'spin', timeout=2.0), CODE)
-    child.wait_for_line('walking')
-    child.wait_for_line('spinning')
-
-    assert child.stop() == 1
-    for node, statement in (('slow_end', 'time.sleep(1000)'), ('spin', 'in spin')):
-        child.wait_for_line(f"node '{node}': timer 'walk' did not end in time; it is at")
-        assert child.matching(statement)
+    assert told_by(child, 'walk')[:4] == ['closed', 'stop', 'closed', 'stop']
+    assert told_by(child, 'walk_async') == ['closed', 'stop']
+    # One that does not let itself be closed is an error.
+    assert child.matching(' raised RuntimeError: generator ignored')
+    assert told_by(child, 'stubborn')[-1] == 'stop'
 
 
 def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_alive(compose):

@@ -1,20 +1,16 @@
 """What a system asks of its executor beyond rclpy's promises."""
 
 import threading
-from contextlib import suppress
 
 import pytest
 
 pytest.importorskip('rclpy')
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.task import Future
 
-from composer.executor import ComposerExecutor
 from composer.runtime.nodes.callback_groups import (
     Gate,
     GatedMutuallyExclusiveGroup,
-    GatedReentrantGroup,
 )
 from composer.runtime.stop_request import StopRequest
 from composer.runtime.system_executor import NoResponseError, SystemExecutor
@@ -35,13 +31,14 @@ def system_executor(context, node):
     assert executor.stop(DEADLINE_SEC)
 
 
-@pytest.mark.parametrize('kind', [GatedMutuallyExclusiveGroup, GatedReentrantGroup])
 def test_a_closed_gate_keeps_ticks_until_it_opens_and_the_executor_is_woken(
-    system_executor, node, wait_for, kind
+    system_executor, node, wait_for
 ):
     gate = Gate(StopRequest())
     ticks, others = [], []
-    node.create_timer(0.01, lambda: ticks.append(1), callback_group=kind(gate))
+    node.create_timer(
+        0.01, lambda: ticks.append(1), callback_group=GatedMutuallyExclusiveGroup(gate)
+    )
     node.create_timer(0.01, lambda: others.append(1))
     wait_for(lambda: len(others) > 5, 'ticks of the timer without a gate')
     assert not ticks
@@ -50,48 +47,6 @@ def test_a_closed_gate_keeps_ticks_until_it_opens_and_the_executor_is_woken(
     system_executor.wake()
 
     wait_for(lambda: len(ticks) > 5, 'ticks behind the gate')
-
-
-def test_callbacks_of_a_gated_reentrant_group_run_beside_each_other(
-    context, node, wait_for, system_executor
-):
-    gate = Gate(StopRequest())
-    gate.open()
-    system_executor.stop(DEADLINE_SEC)
-    executor = SystemExecutor(context, None, print)
-    executor.add_node(node)
-    barrier = threading.Barrier(2)
-    met = []
-
-    def meet():
-        with suppress(threading.BrokenBarrierError):
-            barrier.wait(DEADLINE_SEC)
-            met.append(1)
-
-    node.create_timer(0.01, meet, callback_group=GatedReentrantGroup(gate))
-    executor.start()
-
-    wait_for(lambda: len(met) >= 2, 'two ticks at the same time')
-    # Another tick may wait for its like.
-    barrier.abort()
-    assert executor.stop(DEADLINE_SEC)
-
-
-def test_a_callback_that_waits_does_not_count_against_the_threads(system_executor, node, wait_for):
-    done, others = threading.Event(), []
-
-    def wait_for_others():
-        with system_executor.waiting():
-            assert done.wait(DEADLINE_SEC)
-        others.append('waited')
-
-    waiter = node.create_timer(
-        0.01, wait_for_others, callback_group=MutuallyExclusiveCallbackGroup()
-    )
-    node.create_timer(0.01, done.set, callback_group=MutuallyExclusiveCallbackGroup())
-
-    wait_for(lambda: others, 'the end of the wait')
-    waiter.cancel()
 
 
 def test_as_many_callbacks_run_at_a_time_as_there_may_be_now(system_executor, node, wait_for):
@@ -153,16 +108,3 @@ def test_a_missing_response_is_no_finding(system_executor):
 
     assert done.wait(DEADLINE_SEC)
     assert system_executor.logged == []
-
-
-def test_threads_end_with_their_executor(context, wait_for):
-    before = set(threading.enumerate())
-    executor = ComposerExecutor(context=context)
-    future = Future()
-    executor.create_task(lambda: future.set_result(1))
-    executor.spin_until_future_complete(future, DEADLINE_SEC)
-
-    executor.shutdown()
-
-    # Threads of other executors may end meanwhile.
-    wait_for(lambda: set(threading.enumerate()) <= before, 'the end of its threads')

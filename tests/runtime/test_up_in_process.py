@@ -112,11 +112,11 @@ def run_program(compose):
 
 def test_many_systems_in_a_row_leave_nothing_behind(compose, run_program):
     path = compose.write(SYSTEM, CODE)
-    result = json.loads(run_program(PROGRAM, path.name, 8))
+    result = json.loads(run_program(PROGRAM, path.name, 4))
 
     assert result['seen'] > 0, 'a middleware that shares no memory'
     assert result == {
-        'codes': [0] * 8,
+        'codes': [0] * 4,
         'threads': ['MainThread'],
         'new tasks and descriptors': [0, 0],
         'seen': result['seen'],

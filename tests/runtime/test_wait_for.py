@@ -1,11 +1,6 @@
 """`wait_for`: nodes and processes start in the order that they ask for, without any sleep."""
 
 import sys
-import threading
-from itertools import count
-from math import inf
-from textwrap import dedent
-from types import SimpleNamespace
 
 import pytest
 
@@ -14,10 +9,6 @@ pytest.importorskip('rclpy')
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-import composer.runtime.wait_for as wait_for_module
-from composer.language.specs import ConditionSpec
-from composer.runtime.stop_request import StopRequest
-from composer.runtime.wait_for import Waiter, WaitingStarter
 from tests.running import DEADLINE_SEC
 
 pytestmark = pytest.mark.ros
@@ -33,9 +24,6 @@ def answer(node, request):
 
 def compute(node, goal):
     return {'sequence': []}
-
-def fail(node):
-    raise OSError('no such device')
 
 def meet_peer(node):
     while 'peer' not in node.ros.get_node_names():
@@ -54,7 +42,8 @@ def test_a_node_starts_when_somebody_publishes_the_topic(compose, peer, wait_for
         nodes:
           late:
             namespace: robot
-            wait_for: {{topic: words}}
+            remap: {{said: words}}
+            wait_for: {{topic: said}}
             subscriptions: {{words: {{type: std_msgs/msg/String, behaviour: 'parts:hear', external: true}}}}
             {WAITING}
           free: {{timers: {{t: {{period: 0.02, behaviour: 'parts:tell', with: {{text: tick}}}}}}}}
@@ -150,23 +139,6 @@ def test_a_client_of_a_service_is_no_server(compose, peer, wait_for):
     ]
 
 
-def test_names_are_those_that_the_node_would_use(compose, peer):
-    text = f"""
-        version: 1
-        nodes:
-          user:
-            namespace: robot
-            remap: {{words: /far/words}}
-            wait_for: [{{topic: words, timeout: 30}}, {{topic: ~/own, timeout: 30}}]
-            {WAITING}
-    """
-    peer.run(peer.node.create_publisher, String, '/far/words', 1)
-    peer.run(peer.node.create_publisher, String, '/robot/user/own', 1)
-    child = compose(text, CODE)
-
-    child.wait_until_ready()
-
-
 DRIVER = """
 import sys, rclpy
 from std_msgs.msg import String
@@ -232,7 +204,6 @@ def test_what_is_not_there_in_time_ends_the_start_and_what_was_there_is_said(com
 @pytest.mark.parametrize(
     ('condition', 'trouble', 'help_line'),
     [
-        ('action: grasp', "action '/grasp': nothing serves it", 'actions: /count'),
         (
             'node: /robot/ghost',
             "node '/robot/ghost': there is no such node",
@@ -257,7 +228,6 @@ def test_each_kind_says_what_there_is_instead(compose, peer, condition, trouble,
           free:
             on_start: parts:meet_peer
             publishers: {{words: {{type: std_msgs/msg/String, external: true}}}}
-            actions: {{count: {{type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}}}
     """
     child = compose(text, CODE)
 
@@ -266,23 +236,6 @@ def test_each_kind_says_what_there_is_instead(compose, peer, condition, trouble,
         f"error: node 'late' (system.yaml:4) waited 1 s for the {trouble}",
         f'  help: {help_line}',
     ]
-
-
-def test_a_process_that_has_ended_badly_is_not_waited_for(compose):
-    text = f"""
-        version: 1
-        nodes:
-          late: {{wait_for: [{{topic: never, timeout: 3600}}, {{process: setup}}], {WAITING}}}
-        processes:
-          setup: {{command: [sh, -c, 'exit 3']}}
-    """
-    child = compose(text, CODE)
-
-    assert child.wait() == 1
-    assert child.lines[-1] == (
-        "error: node 'late' (system.yaml:4) waits for the process 'setup': "
-        'it has ended with exit code 3'
-    )
 
 
 def test_a_stop_ends_the_waiting(compose):
@@ -315,66 +268,3 @@ def test_the_end_of_a_required_process_ends_the_waiting(compose):
     """
 
     assert compose(text).wait() == 1
-
-
-def test_on_start_that_raises_after_a_wait_stops_those_that_have_started(compose):
-    text = """
-        version: 1
-        nodes:
-          late: {wait_for: {node: free}, on_start: 'parts:fail'}
-          free: {on_stop: {behaviour: 'parts:tell', with: {text: stops}}}
-    """
-    child = compose(text, CODE)
-
-    assert child.wait() == 1
-    assert child.lines[-2:] == [
-        '[INFO] [free]: stops',
-        "error: node 'late': on_start raised OSError('no such device')",
-    ]
-
-
-def test_nodes_of_one_name_in_two_namespaces_both_start_and_stop(compose):
-    text = """
-        version: 1
-        nodes:
-          /left/arm: &arm
-            timers: {t: {period: 0.02, behaviour: 'parts:tell', with: {text: tick}}}
-            on_stop: {behaviour: 'parts:tell', with: {text: stops}}
-          /right/arm: *arm
-    """
-    child = compose(dedent(text), CODE)
-    child.wait_for_line('[left.arm]: tick')
-    child.wait_for_line('[right.arm]: tick')
-
-    assert child.stop() == 0
-    assert sorted(child.matching('stops')) == [
-        '[INFO] [left.arm]: stops',
-        '[INFO] [right.arm]: stops',
-    ]
-
-
-def test_a_signal_ends_the_wait_at_any_line(context, executor):
-    condition = ConditionSpec('topic', '/words', inf, None, ('nodes', 'late', 'wait_for'))
-    waiter = Waiter(
-        "node 'late'", (condition,), 0.0, lambda each: each.name, print, print, lambda: True
-    )
-    elsewhere = SimpleNamespace(find_hidden=frozenset)
-
-    def wait(ends):
-        """Wait until the handler of a signal runs, which does so between two lines."""
-        stop, lines = StopRequest(), count()
-
-        def trace(frame, event, _argument):
-            is_of_wait = frame.f_globals['__name__'] in {'threading', wait_for_module.__name__}
-            if is_of_wait and event == 'line' and next(lines) == ends:
-                stop.make()
-            return trace
-
-        sys.settrace(trace)
-        WaitingStarter(context, executor, {}, elsewhere, None).start_all([waiter], stop)
-
-    for ends in range(50, 110):
-        thread = threading.Thread(target=wait, args=(ends,), daemon=True)
-        thread.start()
-        thread.join(DEADLINE_SEC)
-        assert not thread.is_alive(), ends

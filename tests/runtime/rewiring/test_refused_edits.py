@@ -1,15 +1,10 @@
 """What ROS reads once in a process is refused while the system runs."""
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run
-from tests.running import ROOT
 
 pytestmark = pytest.mark.ros
 
@@ -67,24 +62,6 @@ def test_a_new_environment_is_refused_until_a_restart(compose, edit, capfd, monk
     child = compose((compose.folder / 'system.yaml').read_text(), CODE)
     child.wait_for_line('second said')
     assert child.stop() == 0
-
-
-def test_a_program_that_runs_a_system_is_told_the_same(compose, edit, capfd, monkeypatch):
-    path = compose.write(SYSTEM, CODE)
-    program = subprocess.Popen(
-        [sys.executable, '-c', f'import composer; composer.up({path.name!r})'],
-        cwd=compose.folder,
-        env=os.environ | {'PYTHONPATH': str(ROOT), 'ROS_LOG_DIR': str(compose.folder)},
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    monkeypatch.setenv('ROS_LOG_DIR', str(compose.folder / 'log'))
-    with program:
-        next(line for line in program.stderr if ' ready in ' in line)
-        edit('MODE: first', 'MODE: second')
-        assert run(['reload']) == 1
-        assert capfd.readouterr().err == f'system: {REFUSED}\n'
-        assert run(['down']) == 0
 
 
 def test_interface_packages_come_and_their_changes_are_refused(

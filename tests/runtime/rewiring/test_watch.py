@@ -147,12 +147,9 @@ def test_edits_change_just_what_they_say(running, peer, wait_for):
 
 def test_what_cannot_be_applied_changes_nothing(running):
     edits = (
-        ('system.yaml', 'parts:say', 'parts:sya', "did you mean 'say'?"),
         ('system.yaml', 'period: 0.05', 'perid: 0.05', "did you mean 'period'?"),
         ('system.yaml', 'timers:\n      say:', 'timers: [', 'error['),
         ('parts.py', 'import time\n', 'import time\n1 / 0\n', 'ZeroDivisionError'),
-        ('parts.py', 'import time\n', 'import time\nraise KeyboardInterrupt\n', 'raised Keyb'),
-        ('parts.py', 'def say(node):', 'def say(node:', 'error['),
         (
             'system.yaml',
             '  listener:',
@@ -213,25 +210,6 @@ def test_a_save_that_changes_nothing_says_so_once(running):
     assert len(running.child.matching(said)) == 1
 
 
-def test_modules_are_executed_anew_wherever_they_are_imported(running):
-    """The package that has a module is as before; it must not keep the old one."""
-    package = running.folder / 'inner'
-    package.mkdir()
-    (package / '__init__.py').touch()
-    (package / 'words.py').write_text("WORD = 'two'\n")
-    running.edit("WORD = 'one'", 'from inner import words\n\nWORD = words.WORD', 'parts.py')
-    running.child.wait_for_line('heard two')
-    running.edit('two', 'three', 'inner/words.py')
-    running.child.wait_for_line('heard three')
-    # What cannot be read is not an empty module.
-    (package / 'words.py').unlink()
-    (package / 'words.py').mkdir()
-    running.child.wait_for_line('not reloaded: ')
-    (package / 'words.py').rmdir()
-    (package / 'words.py').write_text("WORD = 'four'\n")
-    running.child.wait_for_line('heard four')
-
-
 def test_what_hangs_is_left_for_the_next_edit(running):
     good, hang = "WORD = 'one'\n", 'while True:\n    pass\n'
     running.edit(good, good + hang, 'parts.py')
@@ -267,12 +245,3 @@ def test_a_signal_during_a_reload_leaves_nothing(running):
     running.edit('  listener:', '  slow:\n    on_start: parts:hang\n  listener:')
     time.sleep(0.3)
     assert running.child.stop(signal.SIGINT) == 0
-
-
-def test_ten_saves_a_second_end_at_the_last(running):
-    for number in range(20):
-        running.edit(f'period: {0.05 + number / 100:.2f}', f'period: {0.06 + number / 100:.2f}')
-        time.sleep(0.1)
-    running.edit('period: 0.25', 'period: 0.01')
-    said = len(running.child.matching('heard one'))
-    running.child.wait_for_line('heard one', times=said + 50)

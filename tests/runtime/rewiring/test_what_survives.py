@@ -94,9 +94,7 @@ from itertools import pairwise
 
 
 def probe(node, request):
-    level = node.ros.get_logger().get_effective_level().name
-    found = {**vars(node.state), 'level': level}
-    return {'success': True, 'message': json.dumps(found, default=repr)}
+    return {'success': True, 'message': json.dumps(vars(node.state), default=repr)}
 """
 # Modules that import each other in each way that there is.
 LIBRARY = {
@@ -105,7 +103,6 @@ import json
 from itertools import pairwise
 
 import library.deep
-from library import circle
 from library.alone import Kept
 from library.base import Box, helper
 from library.star import *
@@ -124,8 +121,7 @@ def read(node, request):
     found = {
         'helper': helper(),
         'late': late.VALUE,
-        'deep': library.deep.VALUE + library.deep.inner.VALUE,
-        'circle': circle.around(),
+        'deep': library.deep.inner.VALUE,
         'star': STAR,
         'count': count,
         'number': state.box.number,
@@ -149,23 +145,7 @@ def helper():
     'library/late.py': "VALUE = 'old late'\n",
     'library/alone.py': 'class Kept:\n    pass\n',
     'library/star.py': "STAR = 'old star'\n",
-    'library/circle.py': """\
-import library.back
-
-NAME = 'old circle'
-
-
-def around():
-    return library.back.say()
-""",
-    'library/back.py': """\
-import library.circle
-
-
-def say():
-    return library.circle.NAME
-""",
-    'library/deep/__init__.py': "from . import inner\n\nVALUE = 'old deep'\n",
+    'library/deep/__init__.py': 'from . import inner\n',
     'library/deep/inner.py': "VALUE = 'old inner'\n",
 }
 
@@ -289,20 +269,6 @@ class Edited:
         ({'Int32': 'Int64'}, '±1 publisher, ±1 subscription', 'Int64'),
         # An end of a node that comes, goes, or is renamed is in the way, too.
         ({'Int32': 'Int64', '  ear:': '  ear2:'}, '±1 publisher, -1 node, +1 node', None),
-        (
-            {'Int32': 'Int64', '  clock:': '  clock2:'},
-            '-1 node, ±1 subscription, +1 node',
-            'Int64',
-        ),
-        (
-            {
-                'ticks: {type': 'ticks2: {topic: ticks, type',
-                'Int32': 'Int64',
-                'publish: ticks': 'publish: ticks2',
-            },
-            '+1 publisher, -1 publisher, ~1 timer, +1 subscription, -1 subscription',
-            'Int64',
-        ),
     ],
 )
 def test_a_topic_gets_another_type(edited, replacements, done, type_name):
@@ -345,19 +311,9 @@ _STAYS = 'the value that was set while it ran stays'
         (5.0, {'speed: {default: 1.0': 'speed: {default: 2.0'}, 'speed', 5.0, _STAYS),
         # Also if it is the value that the file has.
         (1.0, {'speed: {default: 1.0': 'speed: {default: 2.0'}, 'speed', 1.0, _STAYS),
-        (5.0, {'maximum: 10.0': 'maximum: 20.0'}, 'speed', 5.0, ''),
         (5.0, {'default: 1.0, minimum: 0.0, maximum: 10.0': 'default: fast'}, 'speed', 'fast', ''),
         (None, {'size: 7': 'size: 8'}, 'size', 8, ''),
-        (70, {'size: 7': 'size: 8'}, 'size', 70, _STAYS),
         (None, {'{size: 7}': '{}'}, 'size', 1, ''),
-        (None, {'size: 1': 'size: 2'}, 'size', 7, ''),
-        (
-            None,
-            {'size: 1': 'size: 1\n      more: 1', 'size: 7': 'size: 7, more: 3'},
-            'more',
-            3,
-            '',
-        ),
         (70, {'size: 1': 'size: 1.0', 'size: 7': 'size: 7.5'}, 'size', 7.5, ''),
     ],
 )
@@ -422,32 +378,6 @@ def test_clocks_and_parameter_files_stay_if_something_else_fails(edited):
     assert (edited.get('size'), edited.get('use_sim_time')) == (7, True)
 
 
-def test_changes_are_decided_by_the_old_code_if_something_else_fails(edited):
-    code = 'FIRST = 0\n\n\ndef decide(node, changes):\n    return "%s"\n\n\n'
-    asking = {'  clock:': '  clock:\n    on_parameters: parts:decide'}
-    edited.edit({**asking, 'FIRST = 0': code % 'old'})
-    failing = {
-        'FIRST = 0': f'{code % "new"}def fail(change, changes):\n    return "no"\n',
-        '  ear:': '  ear:\n    use_sim_time: true\n    on_parameters: parts:fail',
-    }
-    _, said = edited.edit({**asking, **failing})
-    assert said == "not reloaded: parameter 'use_sim_time' of 'ear': no"
-    assert edited.set('speed', 2.0) == 'old'
-
-
-def test_a_recreated_entity_is_there_again_if_something_else_fails(edited):
-    other_qos = {'Int32, external: true': 'Int32, external: true, qos: 7'}
-    failing = {
-        'FIRST = 0': 'FIRST = 0\n\n\ndef fail(change, changes):\n    return "no"\n',
-        '  ear:': '  ear:\n    use_sim_time: true\n    on_parameters: parts:fail',
-    }
-    _, said = edited.edit({**other_qos, **failing})
-    assert said == "not reloaded: parameter 'use_sim_time' of 'ear': no"
-    _, said = edited.edit(other_qos)
-    assert said.endswith(': ±1 publisher')
-    wait_for(lambda: edited.count_publishers('/ticks') == 1, 'the end of the old publisher')
-
-
 def test_a_node_with_an_action_server_and_client_goes(edited):
     both = """  ear:
     actions: {run: {type: test_msgs/action/Fibonacci, behaviour: parts:run}}
@@ -460,18 +390,6 @@ def test_a_node_with_an_action_server_and_client_goes(edited):
     wait_for(lambda: 'ear' not in edited.list_nodes(), 'the end of the node')
 
 
-def test_nodes_that_come_or_are_recreated_have_their_log_levels(edited):
-    edited.edit(
-        {
-            '  clock:': '  clock:\n    rosout: false\n    log_level: warn',
-            '  ear:': '  ear2:\n    log_level: error',
-        }
-    )
-    assert (edited.probe('clock')['level'], edited.probe('ear2')['level']) == ('WARN', 'ERROR')
-    edited.edit({'  clock:': '  clock:\n    rosout: false'})
-    assert edited.probe('clock')['level'] == 'INFO'
-
-
 @pytest.mark.parametrize(
     ('replacements', 'changes'),
     [
@@ -481,9 +399,7 @@ def test_nodes_that_come_or_are_recreated_have_their_log_levels(edited):
         ),
         ({"'old late'": "'new late'"}, {'late': 'new late'}),
         ({"'old star'": "'new star'"}, {'star': 'new star'}),
-        ({"'old circle'": "'new circle'"}, {'circle': 'new circle'}),
-        ({"'old inner'": "'new inner'"}, {'deep': 'old deepnew inner'}),
-        ({"'old deep'": "'new deep'"}, {'deep': 'new deepold inner'}),
+        ({"'old inner'": "'new inner'"}, {'deep': 'new inner'}),
         # What is kept is of the class that it was made of.
         ({'number = 1': 'number = 2'}, {}),
         ({'    pass\n': '    """New."""\n'}, {'kept': False}),
@@ -497,10 +413,9 @@ def test_modules_are_new_with_all_that_import_them(edited, replacements, changes
     assert edited.read() == before | changes | {'count': 1}
 
 
-@pytest.mark.parametrize('name', ['late', 'circle', 'inner'])
-def test_a_module_that_raises_changes_nothing(edited, name):
+def test_a_module_that_raises_changes_nothing(edited):
     before = edited.read()
-    _, said = edited.edit({f"'old {name}'": f"'new {name}' if 1 / 0 else ''"})
+    _, said = edited.edit({"'old inner'": "'new inner' if 1 / 0 else ''"})
     assert said.startswith('not reloaded: ')
     assert edited.read() == before | {'count': before['count'] + 1}
 
@@ -578,12 +493,12 @@ def test_reloads_leave_nothing_behind(compose, peer):
     write(0)
     child = compose.run('system.yaml')
     child.wait_until_ready()
-    reload(2)
+    reload(1)
     counts = [count()]
     for _ in range(2):
-        reload(6)
+        reload(4)
         counts.append(count())
-    # One object that each of the 12 reloads leaves would be as many. What is made once and kept,
+    # One object that each of the 8 reloads leaves would be as many. What is made once and kept,
     # as for a log line or a peer that is found late, is there after one of both rounds only.
-    assert min(after - before for before, after in pairwise(counts)) < 12, (counts, child.output)
+    assert min(after - before for before, after in pairwise(counts)) < 8, (counts, child.output)
     assert child.stop() == 0
