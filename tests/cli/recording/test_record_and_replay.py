@@ -13,6 +13,7 @@ pytest.importorskip('rclpy')
 
 import itertools
 
+from composer.cli.main import run as run_command
 from composer.recordings.reading import read_recording
 from tests.recorded import filled, write_recording
 from tests.running import DEADLINE_SEC, ROOT
@@ -24,21 +25,13 @@ PARAMETER_EVENTS = '/parameter_events'
 
 
 @pytest.fixture
-def run(domain_id, tmp_path):
-    """Return a function that runs a command in the test's folder."""
+def run(domain_id, tmp_path, monkeypatch, capsys):
+    """Return a function that runs a command in the test's folder: its exit code and errors."""
+    monkeypatch.chdir(tmp_path)
 
     def run(*words):
-        command = [sys.executable, '-m', 'composer', *map(str, words)]
-        environment = os.environ | {'PYTHONPATH': str(ROOT)}
-        return subprocess.run(
-            command,
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=DEADLINE_SEC,
-        )
+        code = run_command([*map(str, words)])
+        return code, capsys.readouterr().err.splitlines()
 
     return run
 
@@ -88,10 +81,9 @@ def test_what_is_replayed_is_recorded_again_byte_by_byte(run, recording, tmp_pat
     path = write_recording(tmp_path / 'all.mcap', all_messages)
 
     with recording('-o', 'again') as lines:
-        result = run('replay', path, '--wait')
+        code, told = run('replay', path, '--wait')
 
-    assert (result.returncode, result.stdout) == (0, '')
-    assert result.stderr.splitlines()[-1] == f'published {3 * len(all_messages)} messages'
+    assert (code, told[-1]) == (0, f'published {3 * len(all_messages)} messages')
     assert contents(tmp_path / 'again') == contents(path)
     assert lines[-1].endswith(" to 'again'")
 
@@ -128,15 +120,13 @@ def test_only_matching_topics_are_published_from_a_time_on(run, recording, tmp_p
     path = write_recording(tmp_path / 'a.mcap', {'/a/x': messages, '/b/x': messages})
 
     with recording('-o', 'again.mcap', '--topics', '*/x'):
-        result = run(
+        _, told = run(
             *('replay', path, '--wait', '--topics', '/a/*', '--topics', 'nobody'),
             *('--start', '0.000000002'),
             *('--ros-args', '-r', '/a/x:=/c/x'),
         )
 
-    assert [line for line in result.stderr.splitlines() if 'no topic' in line] == [
-        "warning: no topic matches 'nobody'"
-    ]
+    assert [line for line in told if 'no topic' in line] == ["warning: no topic matches 'nobody'"]
     read = [
         (topic, each.data) for _, topic, each in read_recording(tmp_path / 'again.mcap').messages()
     ]
@@ -157,7 +147,7 @@ def test_a_recording_keeps_its_times(run, recording, tmp_path):
     writer._Writer__stream.close()
 
     with recording('-o', 'again.mcap', '--topics', '/a'):
-        assert run('replay', path, '--wait', '--rate', '2').returncode == 0
+        assert run('replay', path, '--wait', '--rate', '2')[0] == 0
 
     times = [each for each, _, _ in read_recording(tmp_path / 'again.mcap').messages()]
     distances = [(later - earlier) / 1e9 for earlier, later in itertools.pairwise(times)]
@@ -184,10 +174,10 @@ def test_topics_that_cannot_be_published_are_named(run, tmp_path):
     writer.finish()
     writer._Writer__stream.close()
 
-    result = run('replay', path)
+    code, told = run('replay', path)
 
-    assert result.returncode == 1
-    assert result.stderr.splitlines() == [
+    assert code == 1
+    assert told == [
         "warning: '/a' is not published: absent_msgs/msg/Nothing: the package 'absent_msgs' is not "
         'installed',
         "warning: '/b' is not published: its messages are in 'protobuf', not in the 'cdr' of ROS 2",
@@ -217,9 +207,8 @@ def test_types_that_are_not_installed_are_built_of_the_file(
     writer.finish()
     writer._Writer__stream.close()
 
-    result = run('replay', path)
-    assert result.returncode == 0, result.stderr
-    assert result.stderr.splitlines()[-1] == 'published 1 message'
+    code, told = run('replay', path)
+    assert (code, told[-1]) == (0, 'published 1 message')
 
     (read,) = read_recording(path).messages()
     assert (read[2].pair.a, read[2].pair.b, read[2].text.data) == (1, 2, 'text')
@@ -297,10 +286,10 @@ def test_a_later_publisher_that_offers_less_is_told(recording, peer, tmp_path, w
 def test_wrong_use_is_an_error(run, tmp_path, words, code, lines):
     write_recording(tmp_path / 'a.mcap', {'/a': [filled(string_class())]})
 
-    result = run(*words)
+    found, told = run(*words)
 
-    errors = [line for line in result.stderr.splitlines() if line.startswith('error')]
-    assert result.returncode == code
+    errors = [line for line in told if line.startswith('error')]
+    assert found == code
     assert [line[: len(lines[0])] for line in errors] == lines
 
 

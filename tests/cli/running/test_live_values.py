@@ -4,12 +4,12 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 
 import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.cli.main import run as run_command
 from tests.running import DEADLINE_SEC, wait_for
 
 pytestmark = pytest.mark.ros
@@ -44,29 +44,26 @@ def count(node, goal):
 """
 
 
-def begin(domain_id, *words):
-    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
-    environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain_id)}
-    # A tilde stands for a space.
-    words = [each.replace('~', ' ') for each in words]
-    return subprocess.Popen([sys.executable, '-m', 'composer', *words], env=environment, **pipes)
-
-
 @pytest.fixture(scope='module')
-def run(shared_compose):
-    """Return a function that runs a command beside the system: its exit code and outputs."""
+def domain(shared_compose):
+    """Return the domain in which the system runs."""
     child = shared_compose(SYSTEM, CODE)
     child.wait_until_ready()
+    yield str(shared_compose.domain_id)
+    assert child.stop() == 0
+
+
+@pytest.fixture
+def run(domain, monkeypatch, capsys):
+    """Return a function that runs a command beside the system: its exit code and outputs."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain)
 
     def run(*words):
-        with run.begin(*words) as child:
-            out, err = child.communicate(timeout=DEADLINE_SEC)
-        return child.returncode, out, err
+        # A tilde stands for a space.
+        code = run_command([each.replace('~', ' ') for each in words])
+        return (code, *capsys.readouterr())
 
-    run.begin = partial(begin, shared_compose.domain_id)
-
-    yield run
-    assert child.stop() == 0
+    return run
 
 
 @pytest.mark.parametrize(
@@ -127,8 +124,11 @@ def test_what_is_wrong_is_told_with_a_way_out(run, words, code, told):
         (['send-goal', 'count', '100000'], 'sequence: ', 1),
     ],
 )
-def test_an_interrupt_ends_it(run, words, line, code):
-    with run.begin(*words) as child:
+def test_an_interrupt_ends_it(domain, words, line, code):
+    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+    environment = {**os.environ, 'ROS_DOMAIN_ID': domain}
+    command = [sys.executable, '-m', 'composer', *words]
+    with subprocess.Popen(command, env=environment, **pipes) as child:
         assert any(line in each for each in child.stdout)
         child.send_signal(signal.SIGINT)
         _, err = child.communicate(timeout=DEADLINE_SEC)
