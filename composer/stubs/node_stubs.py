@@ -41,7 +41,6 @@ _NAMED = (bool, int, str)
 _OPEN = frozenset({'__dict__', 'vars'})
 # The methods of a node that return what has a type of its own.
 _RETURNED = {'now': 'Time'}
-_ARITHMETIC = (ast.Add, ast.Sub, ast.Mult, ast.Div)
 _NUMBERS = frozenset({'int', 'float'})
 
 
@@ -49,12 +48,7 @@ _NUMBERS = frozenset({'int', 'float'})
 class NodeShape:
     """What a node declares; equal ones need one stub.
 
-    Attributes:
-        publishers: The types of messages, by publisher.
-        service_clients: The types of services, by client.
-        action_clients: The types of actions, by client.
-        parameters: The Python types of values, by parameter.
-        state: The types of what `node.state` has, by name; `None` if it may have any.
+    Parameters and state have types of Python. `state` is `None` if it may have any name.
     """
 
     publishers: Types
@@ -72,8 +66,7 @@ def shape_of(
     """Return the shape of a node.
 
     Args:
-        stored: What each module of its behaviours may set in `node.state`, as
-            `find_stored_names` returns it.
+        stored: What `find_stored_names` returns of each module of its behaviours.
         created: What its behaviours create.
     """
     known = [names for names in stored if names is not None]
@@ -145,31 +138,40 @@ def _type_of(parameter: ParameterSpec) -> str:
 def find_stored_names(tree: ast.Module, module: str) -> dict[str, frozenset[str]] | None:
     """Return every name that a module sets as an attribute of anything, with the types of values.
 
-    A class of the module itself is shown as `module:Class`.
-
     It need not be `node.state` itself that it names: that may be passed on, or have another name.
+    A class of the module itself is shown as `module:Class`.
 
     Returns:
         None if it may set names that are not written out.
     """
     names: dict[str, set[str]] = {}
-    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    nodes = [*ast.walk(tree)]
+    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     classes = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
     own = {name: f'{module}:{name}' for name in classes}
-    values = dict(_assigned(tree, own))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
-            names.setdefault(node.attr, set()).add(values.get(id(node), _ANYTHING))
-        elif isinstance(node, ast.Attribute | ast.Name) and (
-            _name_of(node) in _OPEN or (_name_of(node) == 'setattr' and id(node) not in called)
-        ):
-            return None
-        elif isinstance(node, ast.Call) and _name_of(node.func) == 'setattr':
-            name = node.args[1] if len(node.args) > 1 else None
-            if not (isinstance(name, ast.Constant) and isinstance(name.value, str)):
-                return None
-            names.setdefault(name.value, set()).add(_ANYTHING)
-    return {name: frozenset(types) for name, types in names.items()}
+    imports = [
+        alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
+    ]
+    # Arrays of NumPy turn what they are added to into an array.
+    has_arrays = any(name.partition('.')[0] == 'numpy' for name in imports)
+    # What is assigned comes before what it is assigned to.
+    types: dict[int, str] = {}
+    for node in nodes:
+        match node:
+            case ast.Assign(targets=targets, value=value):
+                types.update((id(target), _type_stored(value, own)) for target in targets)
+            case ast.AugAssign(target=target, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
+                types[id(target)] = _ANYTHING if has_arrays else '+='
+            case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
+                names.setdefault(name, set()).add(types.get(id(node), _ANYTHING))
+            case ast.Call(func=ast.Name(id='setattr') | ast.Attribute(attr='setattr'), args=args):
+                if len(args) <= 1 or not isinstance(args[1], ast.Constant):
+                    return None
+                names.setdefault(str(args[1].value), set()).add(_ANYTHING)
+            case ast.Name(id=name) | ast.Attribute(attr=name):
+                if name in _OPEN or (name == 'setattr' and id(node) not in called):
+                    return None
+    return {name: frozenset(several) for name, several in names.items()}
 
 
 def _type_of_state(
@@ -194,22 +196,6 @@ def _type_of_state(
     return ' | '.join(sorted(types)) if known and types else _ANYTHING
 
 
-def _assigned(tree: ast.Module, own: Mapping[str, str]) -> Iterator[tuple[int, str]]:
-    """Yield what is assigned to, and the type of its value."""
-    # Arrays of NumPy turn what they are added to into an array.
-    is_plain = not any(
-        alias.name.partition('.')[0] == 'numpy'
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Import)
-        for alias in node.names
-    )
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Assign):
-            yield from ((id(target), _type_stored(node.value, own)) for target in node.targets)
-        elif isinstance(node, ast.AugAssign) and is_plain and isinstance(node.op, _ARITHMETIC):
-            yield id(node.target), '+='
-
-
 def _type_stored(value: ast.expr, own: Mapping[str, str]) -> str:
     match value:
         case ast.Call(func=ast.Name(id=name)) if name in own:
@@ -223,12 +209,6 @@ def _type_stored(value: ast.expr, own: Mapping[str, str]) -> str:
         case ast.Call(func=ast.Attribute(attr=method), args=[]) if method in _RETURNED:
             return _RETURNED[method]
     return _ANYTHING
-
-
-def _name_of(node: ast.expr) -> str:
-    if isinstance(node, ast.Attribute):
-        return node.attr
-    return node.id if isinstance(node, ast.Name) else ''
 
 
 # Of the methods that send something: the section of what they use, the part of its type that they

@@ -24,12 +24,7 @@ _MOST_MODULES = 300
 
 @record
 class ProjectModule:
-    """A module of the project.
-
-    Attributes:
-        name: Its dotted name.
-        imports: The dotted names that may be modules which it imports.
-    """
+    """A module of the project, with the dotted names that may be modules which it imports."""
 
     name: str
     source: ModuleSource

@@ -41,12 +41,9 @@ _ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 
 @dataclass(slots=True)
 class Received:
-    """What a parameter is given.
+    """The keys of nodes and full names of messages that a parameter is given.
 
-    Attributes:
-        nodes: The keys of nodes.
-        messages: The full names of messages.
-        is_open: Whether it may be given something else.
+    It is open if it may be given something else.
     """
 
     nodes: dict[str, None] = field(default_factory=dict)
@@ -142,12 +139,7 @@ class _Edit:
 
 @record
 class AnnotatedCopy:
-    """A module with annotations.
-
-    Attributes:
-        module: The original.
-        text: The source of the copy.
-    """
+    """A module, and the text of its copy with annotations."""
 
     module: ProjectModule
     text: str
@@ -213,12 +205,7 @@ def _asked_names(node: ast.AST) -> list[ast.expr]:
 
 @dataclass(slots=True)
 class Annotator:
-    """Writes annotated copies.
-
-    Attributes:
-        functions: What is known of the functions, by module and name.
-        name_nodes: Returns the module and the class of nodes, by their keys.
-    """
+    """Writes annotated copies; `name_nodes` returns the module and the class of nodes."""
 
     functions: Mapping[FunctionKey, FunctionUse]
     name_nodes: Callable[[Iterable[str]], tuple[str, str]]

@@ -10,6 +10,7 @@ import builtins
 import itertools
 import re
 import sys
+from collections import ChainMap
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
@@ -92,7 +93,7 @@ class TypeFindings:
     """Turns reports into findings.
 
     Attributes:
-        nodes: The nodes of each class in the stub.
+        nodes: The nodes of each class in the stub, by their keys.
         shapes: What each of these classes has.
         functions: What is known of the project's functions.
         messages: The full names of messages, by their classes; of one that several have, empty.
@@ -102,7 +103,7 @@ class TypeFindings:
     """
 
     context: CheckContext
-    nodes: Mapping[str, Sequence[NodeSpec]]
+    nodes: Mapping[str, Mapping[str, NodeSpec]]
     shapes: Mapping[str, NodeShape]
     functions: Mapping[FunctionKey, FunctionUse]
     messages: Mapping[str, str]
@@ -233,8 +234,11 @@ class TypeFindings:
             and not any(each.decorator_list for each in own)
         )
 
+    def _name_of(self, owner: str) -> str:
+        return next(iter(self.nodes[owner].values())).name
+
     def _unknown_parameter(self, owner: str, name: str, node: ast.expr) -> _Problem:
-        message = f"node '{self.nodes[owner][0].name}' declares no parameter '{name}'"
+        message = f"node '{self._name_of(owner)}' declares no parameter '{name}'"
         known = dict(self.shapes[owner].parameters)
         advice = suggest(name, known, None, "declare it under 'parameters:'")
         return node, 'unknown-parameter', message, advice
@@ -380,7 +384,7 @@ class TypeFindings:
         if name.value not in known:
             if '' in known or place.depends_on_file:
                 return None
-            message = f"node '{self.nodes[owner][0].name}' declares no {noun} {name.value!r}"
+            message = f"node '{self._name_of(owner)}' declares no {noun} {name.value!r}"
             return name, f'unknown-{noun.replace(" ", "-")}', message, suggest(name.value, known)
         types = known[name.value]
         if payload is None or len(types) != 1 or not types[0]:
@@ -662,7 +666,7 @@ class TypeFindings:
 
     def _choices(self, received: Received, name: str) -> set[object]:
         """Return what a parameter of nodes may be; nothing if one of them has no choices."""
-        nodes = {node.key: node for several in self.nodes.values() for node in several}
+        nodes = ChainMap(*map(dict, self.nodes.values()))
         found = [nodes[key].parameters.get(name) for key in received.nodes if key in nodes]
         if len(found) < len(received.nodes) or not all(each and each.choices for each in found):
             return set()

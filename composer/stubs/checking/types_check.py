@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 _CLASS = re.compile(r'^class (\w+)', re.MULTILINE)
 _OF_ROS = re.compile(r'^(composer|rclpy)\.|\.(msg|srv|action)\.')
-# A behaviour of more nodes than these has a class that is named after the first ones.
-_MOST_NAMED = 3
 
 
 def find_type_errors(
@@ -45,18 +43,22 @@ def find_type_errors(
     Raises:
         TypeCheckerError: Pyrefly does not work.
     """
-    classes = _Classes(module_of(context), shapes_of(context, modules), all_nodes(context))
+    module = f'{SUPPORT}.{module_of(context)}'
+    nodes = {node.key: node for node in all_nodes(context)}
+    classes = _Classes(module, shapes_of(context, modules), nodes)
     annotator = Annotator(find_received_values(context, modules), classes.of)
     copies = {module.path: annotator.copy(module) for module in modules.values()}
     files = dict(write_messages(context, modules))
-    files |= classes.files() | stand_ins(context.spec.qos)
+    shapes = classes.shapes_by_name()
+    files[f'{module.replace(".", "/")}.pyi'] = text_of(write_nodes(module, shapes))
+    files |= stand_ins(context.spec.qos)
     texts = {path: copy.text for path, copy in copies.items()}
     version, reports = run_type_checker(program, texts, files)
     own, defined = _own_names(modules)
     findings = TypeFindings(
         context,
         classes.nodes_by_name,
-        classes.shapes_by_name(),
+        shapes,
         annotator.functions,
         _message_classes(files),
         own,
@@ -72,40 +74,29 @@ def find_type_errors(
 
 @dataclass(slots=True)
 class _Classes:
-    """The classes of nodes, and of nodes together that have a behaviour in common.
-
-    Attributes:
-        nodes_by_name: The nodes that each class that was asked for stands for.
-    """
+    """The classes of nodes, and of nodes together that have a behaviour in common."""
 
     module: str
     shapes: dict[str, NodeShape]
-    nodes: list[NodeSpec]
+    nodes: dict[str, NodeSpec]
     _names: dict[NodeShape, str] = field(default_factory=dict)
-    nodes_by_name: dict[str, list[NodeSpec]] = field(default_factory=dict)
+    nodes_by_name: dict[str, dict[str, NodeSpec]] = field(default_factory=dict)
 
     def of(self, keys: Iterable[str]) -> tuple[str, str]:
         """Return the module and the name of the class of nodes, by their keys in the file."""
         several = list(keys)
         shape = merge_shapes(self.shapes[key] for key in several)
-        if shape not in self._names:
-            name = 'Or'.join(map(class_name, several[:_MOST_NAMED]))
-            taken = name in self._names.values()
-            self._names[shape] = f'{name}_{len(self._names)}' if taken else name
-        nodes = self.nodes_by_name.setdefault(self._names[shape], [])
-        missing = {*several}.difference(node.key for node in nodes)
-        nodes += [node for node in self.nodes if node.key in missing] if missing else ()
-        return f'{SUPPORT}.{self.module}', self._names[shape]
+        name = 'Or'.join(map(class_name, several))
+        if name in self._names.values():
+            name = f'{name}_{len(self._names)}'
+        name = self._names.setdefault(shape, name)
+        nodes = self.nodes_by_name.setdefault(name, {})
+        nodes.update((key, self.nodes[key]) for key in several)
+        return self.module, name
 
     def shapes_by_name(self) -> dict[str, NodeShape]:
         """Return the shape of each class that was asked for."""
         return {name: shape for shape, name in self._names.items()}
-
-    def files(self) -> dict[str, str]:
-        """Return the stub with the classes that were asked for, by its path."""
-        classes = self.shapes_by_name()
-        text = text_of(write_nodes(f'{SUPPORT}.{self.module}', classes))
-        return {f'{SUPPORT}/{self.module}.pyi': text}
 
 
 def _message_classes(files: dict[str, str]) -> dict[str, str]:
