@@ -83,9 +83,6 @@ def serve_calculator():
 
 def serve_fibonacci(answer='accept'):
     def compute(goal):
-        # The client's ends are found one after the other, that for feedback before this one.
-        while not node.count_subscribers('fibonacci/_action/status'):
-            time.sleep(0.01)
         sequence = [0, 1]
         for _ in range(1, goal.request.order):
             sequence.append(sequence[-1] + sequence[-2])
@@ -94,6 +91,9 @@ def serve_fibonacci(answer='accept'):
         return Fibonacci.Result(sequence=sequence)
 
     def decide(_goal):
+        # ROS drops what goes to an end that is not found yet; a client's last one is this.
+        while not node.count_subscribers('fibonacci/_action/status'):
+            time.sleep(0.01)
         return GoalResponse.ACCEPT if answer == 'accept' else GoalResponse.REJECT
 
     ActionServer(node, Fibonacci, 'fibonacci', compute, goal_callback=decide)
