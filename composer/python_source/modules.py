@@ -21,7 +21,6 @@ from composer.input_limits import (
 )
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.syntax import (
-    BLOCKS,
     SCOPES,
     FunctionNode,
     UnreadModuleError,
@@ -37,10 +36,11 @@ from composer.python_source.syntax import (
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
 # Longer lines of classes are not followed.
 MOST_BASES = 20
+_STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
 _BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
@@ -92,17 +92,19 @@ class TopNames:
         self.statements: dict[str, list[tuple[ast.AST, bool]]] = {}
         self.is_open = False
         self._body = list(body)
-        pending: list[tuple[ast.AST, bool]] = [(each, False) for each in reversed(self._body)]
+        pending: list[tuple[ast.AST, ast.AST, bool]]
+        pending = [(statement, statement, False) for statement in reversed(self._body)]
         while pending:
-            statement, is_conditional = pending.pop()
-            for node in _nodes_beside_blocks(statement):
-                for name in bound_names(node):
-                    self.statements.setdefault(name, []).append((statement, is_conditional))
-                    self.is_open |= name in ('*', '__getattr__')
-                self.is_open |= _may_store_any(node)
-            if not isinstance(statement, _BINDING):
-                blocks = (getattr(statement, name, ()) for name in BLOCKS)
-                pending += [(each, True) for block in blocks for each in reversed(block)]
+            node, statement, is_conditional = pending.pop()
+            for name in bound_names(node):
+                self.statements.setdefault(name, []).append((statement, is_conditional))
+                self.is_open |= name in ('*', '__getattr__')
+            self.is_open |= _may_store_any(node)
+            for child in () if isinstance(node, SCOPES) else reversed(list_children(node)):
+                if isinstance(child, _STATEMENTS):
+                    pending.append((child, child, True))
+                elif not isinstance(child, ast.comprehension):
+                    pending.append((child, statement, is_conditional))
 
     @cached_property
     def is_dynamic(self) -> bool:
@@ -136,17 +138,6 @@ class TopNames:
     @cached_property
     def _nodes(self) -> list[ast.AST]:
         return list_nodes(self._body)
-
-
-def _nodes_beside_blocks(statement: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a statement without those of the statements in it."""
-    pending: list[ast.AST] = [statement]
-    while pending:
-        node = pending.pop()
-        yield node
-        if not isinstance(node, SCOPES):
-            inner = (ast.stmt, ast.ExceptHandler, ast.match_case, ast.comprehension)
-            pending += [each for each in list_children(node) if not isinstance(each, inner)]
 
 
 def _may_store_any(node: ast.AST) -> bool:

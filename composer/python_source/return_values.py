@@ -196,16 +196,13 @@ class _Ways:
     def _past_match(self, node: ast.Match, tested: frozenset[str]) -> _Tested:
         within = tested | self._subjects(node.subject)
         ends = [self.follow(case.body, within) for case in node.cases]
-        *others, last = node.cases
         tests = [
             ast.Compare(node.subject, [ast.Eq()], [case.pattern.value])
             for case in node.cases
             if isinstance(case.pattern, ast.MatchValue)
         ]
-        is_single = isinstance(last.pattern, ast.MatchValue | ast.MatchSingleton) and not others
-        is_open = len(tests) == len(node.cases) and all(map(self._is_one_text, tests))
-        is_past = is_open or (is_single and not self._is_tested(node.subject, tested))
-        match last:
+        is_past = len(tests) == len(node.cases) and all(map(self._is_one_text, tests))
+        match node.cases[-1]:
             case ast.match_case(
                 pattern=ast.MatchAs(pattern=None)
                 | ast.MatchOr(patterns=[*_, ast.MatchAs(pattern=None)]),

@@ -25,8 +25,6 @@ _MOST_CODE_OBJECTS = 4000
 _MOST_COMPILED_NODES = 300_000
 _WAYS_OUT = (ast.Return, ast.Break, ast.Continue)
 SCOPES = (*FUNCTIONS, ast.ClassDef, ast.Lambda)
-# The fields of statements that hold others.
-BLOCKS = ('body', 'handlers', 'cases', 'orelse', 'finalbody')
 
 
 class UnreadModuleError(ComposerError):

@@ -332,7 +332,6 @@ UNANSWERED = {
     f'try: {GIVES}\n    except OSError: pass': 1,
     f'try: {GIVES}\n    except OSError: return': 3,
     f'while request.data: {GIVES}': 1,
-    f'match request.data:\n        case True: {GIVES}': 1,
     f'if request.data: return None\n    {GIVES}': 2,
     f'with open("x") as file:\n        if file: {GIVES}': 1,
     f'for _ in range(3):\n        try: {GIVES}\n        except OSError: print()': 1,
