@@ -32,7 +32,7 @@ from composer.node_uses.walk import TooLongError, Walk
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import ends_without_value, never_returns
-from composer.python_source.syntax import FUNCTIONS, list_children, own_nodes
+from composer.python_source.syntax import FUNCTIONS, is_none, list_children, own_nodes
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -207,9 +207,8 @@ class _Results:
 
     def _note_payload(self, value: ast.expr, key: str) -> None:
         module = self.function.module
-        is_none = isinstance(value, ast.Constant) and value.value is None
         is_last = self.kind is FunctionKind.ASYNC_GENERATOR
-        if not is_none and not is_last:
+        if not is_none(value) and not is_last:
             self.walk.run.reading.payloads.append(Payload('', key, '', value, module, True))
             for node in value.values if isinstance(value, ast.Dict) else [value]:
                 if self.wire.returned or self.wire.yielded:

@@ -20,6 +20,7 @@ from composer.python_source.syntax import (
     FunctionNode,
     bound_names,
     imported_names,
+    is_none,
     list_arguments,
     own_nodes,
     positional_names,
@@ -469,7 +470,7 @@ class _Members:
                 case ast.FunctionDef() | ast.AsyncFunctionDef():
                     self.methods[statement.name] = statement
                     self._read(statement)
-                case ast.Assign(targets=[ast.Name(id=name)], value=value) if not _is_none(value):
+                case ast.Assign(targets=[ast.Name(id=name)], value=value) if not is_none(value):
                     self.assigned[name] = value
 
     def _read(self, method: FunctionNode) -> None:
@@ -478,7 +479,7 @@ class _Members:
             for target, value, _ in assignments(node):
                 match target:
                     case ast.Attribute(value=ast.Name(id=owner), attr=name):
-                        if owner == own_name and not _is_none(value):
+                        if owner == own_name and not is_none(value):
                             self.stored.setdefault(name, []).append((method, value))
 
 
@@ -509,7 +510,3 @@ def _item_of(owner: Value | None, index: ast.expr) -> Value | None:
 
 def _is_of_message(value: Value | None) -> TypeGuard[Chain]:
     return isinstance(value, Chain) and value.path[0] in ('message', 'made')
-
-
-def _is_none(value: ast.expr | None) -> bool:
-    return isinstance(value, ast.Constant) and value.value is None

@@ -18,6 +18,7 @@ from composer.node_uses.reading import (
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.modules import read_signature
+from composer.python_source.syntax import is_none
 from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
@@ -120,9 +121,8 @@ def _note_sent(
     waits: Waited = 'answer' if is_wait and scope.waits and not run.doubts else ''
     run.use(kind, named, waits=waits)
     payload, name = arguments.get('payload'), only_text(named)
-    is_none = isinstance(payload, ast.Constant) and payload.value is None
     is_known = name is not None and not (run.guards or run.fixed)
-    if payload is not None and name and is_known and not (is_none and method != 'publish'):
+    if payload is not None and name and is_known and (method == 'publish' or not is_none(payload)):
         section, part = KIND_OF_NOUN[kind].section, _PARTS[method]
         sent = Payload(section, name, part, payload, scope.module, run.is_certain)
         run.reading.payloads.append(sent)

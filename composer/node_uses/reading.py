@@ -374,11 +374,9 @@ class Run:
         """
         before = self.standing
         self.doubt(chosen, held)
-        try:
-            with self.guard(is_guard=chosen == 'fixed'):
-                yield
-        finally:
-            self.standing = before
+        with self.guard(is_guard=chosen == 'fixed'):
+            yield
+        self.standing = before
 
     def doubt(self, chosen: str, held: str = '') -> None:
         """Note a condition from here on."""
@@ -392,11 +390,9 @@ class Run:
         """Note what is read meanwhile as guarded, if it is."""
         self.guards += is_guard
         self.broad_guards += is_broad
-        try:
-            yield
-        finally:
-            self.guards -= is_guard
-            self.broad_guards -= is_broad
+        yield
+        self.guards -= is_guard
+        self.broad_guards -= is_broad
 
     def report(
         self, rule: str, module: ModuleSource, node: ast.AST, message: str, help_text: str | None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from composer.node_uses.message_uses import shown_value
 from composer.node_uses.names import Chain, External, Made
 from composer.node_uses.reading import Awaited, Block
-from composer.python_source.syntax import own_nodes
+from composer.python_source.syntax import is_none, own_nodes
 
 if TYPE_CHECKING:
     from composer.node_uses.names import Scope
@@ -79,9 +79,7 @@ def _is_timed(name: str, call: ast.Call) -> bool:
         return not is_true or 'timeout' in keywords or len(call.args) > 1
     position = 1 if name in ('wait_for', 'get') else 0
     timeout = keywords.get('timeout', call.args[position] if len(call.args) > position else None)
-    return timeout is not None and not (
-        isinstance(timeout, ast.Constant) and timeout.value is None
-    )
+    return not is_none(timeout)
 
 
 # Locks

@@ -211,13 +211,11 @@ class ModuleSource:
 
         Imports for type checkers count as well.
         """
-        found: dict[str, set[str]] = {}
-        for name, statements in self.top.statements.items():
-            for node, _ in statements:
-                is_import = isinstance(node, ast.Import | ast.ImportFrom)
-                names = dict(imported_names(node)) if is_import else {}
-                found.setdefault(name, set()).add(names.get(name, ''))
-        return {name: min(full) for name, full in found.items() if len(full) == 1 and min(full)}
+        meanings = {
+            name: {dict(imported_names(node)).get(name, '') for node, _ in statements}
+            for name, statements in self.top.statements.items()
+        }
+        return {name: full for name, (full, *others) in meanings.items() if full and not others}
 
     @cached_property
     def _meanings(self) -> dict[str, FunctionSource | str]:

@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from composer.python_source.annotations import dotted_name
-from composer.python_source.syntax import own_nodes, positional_names, stored_names
+from composer.python_source.syntax import is_none, own_nodes, positional_names, stored_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,7 +94,7 @@ def ends_without_value(
     Args:
         is_last: Whether a call never returns; others have the names of such functions.
     """
-    has_value = any(not _is_bare(answer) for answer in _returns(function))
+    has_value = any(not is_none(answer.value) for answer in _returns(function))
     ways = _Ways(function, is_last, is_certain=has_value)
     is_end = ways.follow(function.body, frozenset()) is not None
     return [*ways.bare, *([function] if is_end else [])]
@@ -111,12 +111,6 @@ def never_returns(function: FunctionNode) -> bool:
 def _ends(function: FunctionNode) -> bool:
     """Return whether no way through a function comes to its end: all return or raise."""
     return _Ways(function, is_certain=False).follow(function.body, frozenset()) is None
-
-
-def _is_bare(statement: ast.Return) -> bool:
-    return statement.value is None or (
-        isinstance(statement.value, ast.Constant) and statement.value.value is None
-    )
 
 
 class _Ways:
@@ -162,7 +156,7 @@ class _Ways:
     def _past(self, statement: ast.stmt, tested: frozenset[str]) -> _Tested:
         match statement:
             case ast.Return():
-                self.bare += [statement.value or statement] if _is_bare(statement) else []
+                self.bare += [statement.value or statement] if is_none(statement.value) else []
             case ast.Break() | ast.Continue():
                 is_break = isinstance(statement, ast.Break)
                 (self._broken if is_break else self._continued).append(tested)

@@ -125,6 +125,13 @@ def positional_names(definition: FunctionNode | ast.Lambda) -> list[str]:
     return [each.arg for each in (*definition.args.posonlyargs, *definition.args.args)]
 
 
+def is_none(expression: ast.expr | None) -> bool:
+    """Return whether an expression is `None`, or is missing."""
+    return expression is None or (
+        isinstance(expression, ast.Constant) and expression.value is None
+    )
+
+
 def words_in(*nodes: ast.AST | None) -> set[str]:
     """Return the names and attributes in expressions."""
     inner = [each for node in nodes if node is not None for each in ast.walk(node)]
