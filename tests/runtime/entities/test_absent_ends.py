@@ -92,7 +92,6 @@ def test_they_are_there_while_they_are_wanted(compose, peer):
 @pytest.mark.parametrize(
     ('changed', 'expected'),
     [
-        (('made_by: library', 'made_by: me'), ["expected 'library', got 'me'"]),
         (
             ("behaviour: 'parts:hear', publish: out,", 'made_by: library,'),
             ["'made_by' and 'active' cannot be used together in subscription 'image'"],
@@ -101,7 +100,6 @@ def test_they_are_there_while_they_are_wanted(compose, peer):
             ("behaviour: 'parts:hear', publish: out,", ''),
             ["'behaviour' or 'publish' is missing in subscription 'image'"],
         ),
-        (('active: false', 'active: soon'), ["expected true or false, got 'soon'"] * 2),
     ],
 )
 def test_what_is_wrong_with_them_is_a_finding(changed, expected):

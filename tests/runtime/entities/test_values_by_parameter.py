@@ -86,6 +86,11 @@ cases:
       - {at: 0.56, set_parameters: {imu: {prefix: other}}, refused: true}
     until: 1.0501
     then: [{topic: /left/a, count: 55}]
+"""
+LISTED = """
+version: 1
+system: {file: system.yaml}
+cases:
   listed:
     given: {parameters: {imu: {topics: [b]}}}
     until: 1
@@ -93,21 +98,14 @@ cases:
 """
 
 
-def run_test(folder, domain_id):
-    child = Child(['test', 'test.yaml'], folder, domain_id, folder / 'log')
-    try:
-        return child.wait(), child.output
-    finally:
-        child.end()
-
-
 def test_scenarios_follow_parameters_but_for_lists(compose, tmp_path, domain_id):
     compose.write(SYSTEM)
-    path = tmp_path / 'test.yaml'
-    path.write_text(SCENARIO)
-    code, output = run_test(tmp_path, domain_id)
-    assert code == 1
-    assert "entities are repeated for the values of 'topics'" in output
-    path.write_text(SCENARIO.partition('  listed:')[0])
-    code, output = run_test(tmp_path, domain_id)
-    assert code == 0, output
+    (tmp_path / 'test.yaml').write_text(SCENARIO)
+    (tmp_path / 'listed.yaml').write_text(LISTED)
+    child = Child(['test', 'test.yaml', 'listed.yaml'], tmp_path, domain_id, tmp_path / 'log')
+    try:
+        assert child.wait() == 1
+    finally:
+        child.end()
+    assert "entities are repeated for the values of 'topics'" in child.output
+    assert '2 passed' in child.output, child.output

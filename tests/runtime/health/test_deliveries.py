@@ -10,7 +10,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Int32
 
 from composer.cli.main import run
-from composer.runtime.messages.local_delivery import LocalPublisher
 
 pytestmark = pytest.mark.ros
 
@@ -28,7 +27,8 @@ nodes:
       far: {type: std_srvs/srv/Trigger, external: true}
     action_clients: {go: test_msgs/action/Fibonacci}
     timers:
-      say: {rate: 50, publish: near, message: 1}
+      say: {rate: 50, behaviour: parts:say}
+      slow: {rate: 10, behaviour: parts:call}
   ear:
     subscriptions:
       near: {type: std_msgs/msg/Int32, behaviour: parts:hear}
@@ -38,6 +38,14 @@ nodes:
     actions: {go: {type: test_msgs/action/Fibonacci, behaviour: parts:go}}
 """
 CODE = """
+def say(node):
+    node.publish('near', 1)
+    node.publish('kept', 1)
+
+async def call(node):
+    await node.call_async('ask')
+    node.send_goal('go', {'order': 1})
+
 def hear(node, message):
     pass
 
@@ -49,7 +57,7 @@ def answer(node, request):
 """
 
 
-def test_the_way_is_told_and_changes_in_place(compose, peer, wait_for, capsys):
+def test_the_way_and_the_rate_are_told_and_change_in_place(compose, peer, wait_for, capsys):
     child = compose(SYSTEM, CODE)
     child.wait_until_ready()
     heard = peer.listen(DiagnosticArray, '/diagnostics', 100)
@@ -75,6 +83,18 @@ def test_the_way_is_told_and_changes_in_place(compose, peer, wait_for, capsys):
         'far': ('sent', 'its server is outside'),
         'go': ('local', ''),
     }
+
+    def have_rates():
+        assert run(['top', '--once', '--format', 'json']) == 0
+        rates = {
+            each['name']: each['rate_hz']
+            for each in json.loads(capsys.readouterr()[0])['entities']
+            if each['delivery'] is not None
+        }
+        none = {each for each, rate in rates.items() if rate == 0.0}
+        return none == {'nowhere', 'far'} and min(rates['near'], rates['kept']) > rates['ask']
+
+    wait_for(have_rates, 'the rates')
     near = '/mouth: publisher near'
     wait_for(lambda: status(near) == 'local', 'the way in diagnostics')
     assert status('/mouth: service client ask') == 'local'
@@ -88,42 +108,3 @@ def test_the_way_is_told_and_changes_in_place(compose, peer, wait_for, capsys):
     assert run(['reload']) == 0
     assert '~1 publisher' in capsys.readouterr()[0]
     assert deliveries()['near'] == ('sent', 'local_delivery: false')
-
-
-def test_publishers_and_clients_have_a_rate(compose, capsys, wait_for):
-    system = SYSTEM.replace(
-        'say: {rate: 50, publish: near, message: 1}',
-        'say: {rate: 50, behaviour: parts:say}\n      slow: {rate: 10, behaviour: parts:call}',
-    )
-    code = f"""{CODE}
-def say(node):
-    node.publish('near', 1)
-    node.publish('kept', 1)
-
-async def call(node):
-    await node.call_async('ask')
-    node.send_goal('go', {{'order': 1}})
-"""
-    compose(system, code).wait_until_ready()
-
-    def have_rates():
-        assert run(['top', '--once', '--format', 'json']) == 0
-        rates = {
-            each['name']: each['rate_hz']
-            for each in json.loads(capsys.readouterr()[0])['entities']
-            if each['delivery'] is not None
-        }
-        none = {each for each, rate in rates.items() if rate == 0.0}
-        return none == {'nowhere', 'far'} and min(rates['near'], rates['kept']) > rates['ask']
-
-    wait_for(have_rates, 'the rates')
-
-
-def test_a_publisher_that_is_gone_has_nobody_who_listens(node):
-    """Who measures asks in a thread of its own, and must bear that a node goes meanwhile."""
-    ros = node.create_publisher(Int32, 'said', 1)
-    local = LocalPublisher(node, ros, is_local=True, returns=False)
-    node.create_subscription(Int32, 'said', lambda message: None, 1)
-    assert local.delivery()[0] == 'sent'
-    node.destroy_publisher(ros)
-    assert local.delivery() == ('', '')

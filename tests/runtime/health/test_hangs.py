@@ -6,8 +6,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from std_srvs.srv import Trigger
-
 pytestmark = pytest.mark.ros
 
 CODE = """
@@ -33,10 +31,10 @@ async def pause():
     threading.Thread(target=lambda: (wait_for('over'), future.set_result(None))).start()
     await future
 
-async def hang_async(node, *_):  # composer: ignore[field-type]
+async def hang_async(node):
     await pause()
 
-async def block_async(node, *_):
+async def block_async(node):
     await block()
 
 async def block():
@@ -139,16 +137,10 @@ def test_a_behaviour_that_hangs_is_reported_once_with_its_stack_and_when_it_ends
     assert len(child.matching('has been running for')) == len(HANGING)
 
 
-@pytest.mark.parametrize(
-    ('defaults', 'limits'),
-    [
-        ('0.1', {('null', '0.1'): False, (None, 'null'): False, (None, None): True}),
-        ('null', {('0.1', 'null'): True, (None, '0.1'): True}),
-    ],
-)
-def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
-    compose, defaults, limits
-):
+LIMITS = {('null', '0.1'): False, (None, 'null'): False, (None, None): True, ('0.1', 'null'): True}
+
+
+def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(compose):
     def key(value):
         return '' if value is None else f', warn_after: {value}'
 
@@ -159,12 +151,12 @@ def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
             description: a node
             {key(node).removeprefix(', ')}
 """
-        for number, (own, node) in enumerate(limits)
+        for number, (own, node) in enumerate(LIMITS)
     )
     text = f"""
         version: 1
         executor: {{threads: 8}}
-        defaults: {{warn_after: {defaults}}}
+        defaults: {{warn_after: 0.1}}
         nodes:
 {nodes}
           witness:
@@ -173,7 +165,7 @@ def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
     """
     child = compose(text, CODE)
     child.wait_for_line('[witness]: timer')
-    for number, is_reported in enumerate(limits.values()):
+    for number, is_reported in enumerate(LIMITS.values()):
         if is_reported:
             child.wait_for_line(f"[bad_{number}]: timer 'stuck' (system.yaml:")
     (compose.folder / 'over').touch()
@@ -181,7 +173,7 @@ def test_the_limit_of_an_entity_wins_over_those_of_the_node_and_of_the_file(
     assert child.stop() == 0
 
     reports = child.matching('has been running for')
-    for number, is_reported in enumerate(limits.values()):
+    for number, is_reported in enumerate(LIMITS.values()):
         assert any(f'[bad_{number}]: ' in line for line in reports) is is_reported
 
 
@@ -208,53 +200,28 @@ def test_what_is_slow_again_and_again_is_not_told_each_time(compose):
     assert len(child.matching('returned after')) == 1
 
 
-def test_a_wait_for_an_answer_counts_like_any_other_time(compose):
+def test_a_service_that_hangs_is_reported_and_who_waits_for_its_answer(compose):
     text = """
         version: 1
         nodes:
           bad:
             service_clients: {slow: std_srvs/srv/Trigger}
             timers: {ask: {period: 0.02, behaviour: 'parts:call', warn_after: 0.1}}
-          slow:
-            services: {slow: {type: std_srvs/srv/Trigger, behaviour: 'parts:hang'}}
-    """
-    child = compose(text, CODE)
-    line = child.wait_for_line('has been running for')
-    child.wait_for_line("[bad]: timer 'ask' (system.yaml:6) returned after")
-
-    assert 'in call' in stack_after(child, line)
-    (compose.folder / 'over').touch()
-
-
-def test_a_service_that_hangs_is_reported(compose, peer):
-    behaviours = ('hang', 'hang_async')
-    services = '\n'.join(
-        f"              {name}: {{type: std_srvs/srv/Trigger, behaviour: 'parts:{name}', warn_after: 0.1, group: {name}}}"
-        for name in behaviours
-    )
-    text = f"""
-        version: 1
-        nodes:
-          bad:
             services:
-{services}
+              slow: {type: std_srvs/srv/Trigger, behaviour: 'parts:hang', warn_after: 0.1, group: own}
     """
     child = compose(text, CODE)
-    child.wait_until_ready()
-    for name in behaviours:
-        client = peer.run(peer.node.create_client, Trigger, name)
-        assert client.wait_for_service(30)
-        client.call_async(Trigger.Request())
+    owners = {
+        "timer 'ask' (system.yaml:6)": 'in call',
+        "service 'slow' (system.yaml:8)": 'in hang',
+    }
     reports = {
-        name: child.wait_for_line(
-            f"[bad]: service '{name}' (system.yaml:{place}) has been running for"
-        )
-        for place, name in enumerate(behaviours, start=6)
+        owner: child.wait_for_line(f'[bad]: {owner} has been running for') for owner in owners
     }
     (compose.folder / 'over').touch()
-    for place, name in enumerate(behaviours, start=6):
-        child.wait_for_line(f"[bad]: service '{name}' (system.yaml:{place}) returned after")
-        assert f'in {name}' in stack_after(child, reports[name])
+    for owner, function in owners.items():
+        child.wait_for_line(f'[bad]: {owner} returned after')
+        assert function in stack_after(child, reports[owner])
 
 
 def test_hooks_of_a_node_that_hang_are_reported(compose):

@@ -10,8 +10,8 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.validate_node_name import validate_node_name
 
-from composer.runtime.behaviours.calls import FAILED, BehaviourCall
-from composer.runtime.behaviours.running_calls import Owner, RunningCall, RunningCalls
+from composer.runtime.behaviours.calls import BehaviourCall
+from composer.runtime.behaviours.running_calls import Owner, RunningCalls
 from composer.runtime.control.protocol import node_name
 from composer.runtime.health.diagnostic_status import StatusWriter
 from composer.runtime.health.missed import MissedCounts
@@ -27,11 +27,8 @@ def times_of(durations):
 
 DISTRIBUTIONS = {
     'constant': lambda chance: 1_000_000,
-    'uniform': lambda chance: chance.randrange(10_000, 5_000_000),
-    'exponential': lambda chance: int(chance.expovariate(1 / 300_000)),
     'log-normal': lambda chance: int(chance.lognormvariate(11.0, 2.0)),
     'two peaks': lambda chance: 20_000 if chance.random() < 0.97 else 80_000_000,
-    'hours': lambda chance: chance.randrange(10**12, 10**14),
 }
 
 
@@ -50,40 +47,19 @@ def test_the_mean_and_the_maximum_are_exact():
     assert (times.calls(), times.mean_ns(), times.most_ns) == (4, 3_000_305 / 4, 3_000_000)
 
 
-def test_every_duration_counts_in_one_bucket_that_holds_it():
-    for duration in [*range(2_000), *(2**power + 1 for power in range(15, 60))]:
-        times = times_of([duration, duration * 2 + 512])
-        assert duration <= times.percentile_ns(0.5) <= duration * 9 / 8 + 256
-
-
-def test_no_calls_have_no_times():
-    times = CallTimes()
-    assert (times.calls(), times.mean_ns(), times.percentile_ns(0.99)) == (0, 0.0, 0)
-
-
-def test_what_is_taken_begins_anew():
-    times = times_of([10_000, 20_000])
-    first = times.take()
-    times.add(7_000)
-    second = times.take()
-    assert (first.calls(), first.total_ns, first.most_ns) == (2, 30_000, 20_000)
-    assert (second.calls(), second.total_ns, second.most_ns) == (1, 7_000, 7_000)
-    assert times.calls() == 0
-
-
 def test_calls_of_several_threads_are_all_counted():
     times = CallTimes()
     taken = []
     threads = [
-        threading.Thread(target=lambda: [times.add(n) for n in range(50_000)]) for _ in range(4)
+        threading.Thread(target=lambda: [times.add(n) for n in range(20_000)]) for _ in range(4)
     ]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
         taken.append(times.take())
     taken.append(times.take())
-    assert sum(one.calls() for one in taken) == 200_000
-    assert sum(one.total_ns for one in taken) == 4 * sum(range(50_000))
+    assert sum(one.calls() for one in taken) == 80_000
+    assert sum(one.total_ns for one in taken) == 4 * sum(range(20_000))
 
 
 def test_a_report_tells_the_period_and_the_whole():
@@ -115,18 +91,6 @@ def test_what_is_missed_at_rest_does_not_count():
     assert heard == [(3, 3), (0, 3), (0, 3), (2, 5), (0, 5), (8, 13)]
 
 
-def test_an_error_that_cannot_be_shown_counts_too():
-    class MuteError(Exception):
-        def __str__(self):
-            raise ValueError
-
-    health = EntityHealth()
-    health.note_error(MuteError())
-    report = health.report(1.0, 0.0)
-    assert report.errors == 1
-    assert report.last_error == 'MuteError: <its __str__ raised ValueError>'
-
-
 def test_a_huge_error_that_ros_cannot_say_is_made_short_and_sayable():
     health = EntityHealth()
     health.note_error(ValueError('\udcff' * 3_000_000))
@@ -150,27 +114,10 @@ def test_counts_survive_that_the_node_is_built_anew():
     assert report.missed == MissedCounts(late_ticks=1, skipped_ticks=4)
 
 
-def test_the_board_knows_the_oldest_call_of_each_entity():
-    board = HealthRegistry()
-    for owner in (Owner('timer', 'b'), Owner('timer', 'c')):
-        board.entity('/a', owner)
-    running = [('/a', RunningCall(Owner('timer', 'b'), begun_ns, 1)) for begun_ns in (9, 4, 6)]
-    reports = board.reports(1.0, [(node, call) for node, call in running], 4 + 2 * 10**9)
-    assert reports['/a', Owner('timer', 'b')].overdue_sec == 2.0
-    assert reports['/a', Owner('timer', 'c')].overdue_sec == 0.0
-
-
 def measured_call(function, times, failed=lambda owner, error: None):
     return BehaviourCall(
         'it', function, RunningCalls(), deliver=lambda _: None, failed=failed, add_time=times.add
     )
-
-
-def test_calls_count_whether_they_raise_or_not():
-    times = CallTimes()
-    assert measured_call(lambda: None, times).run() is not FAILED
-    assert measured_call(lambda: 1 / 0, times).run() is FAILED
-    assert times.calls() == 2
 
 
 def test_coroutines_are_measured_to_their_end():
@@ -191,7 +138,7 @@ def test_coroutines_are_measured_to_their_end():
     assert times.calls() == 1
 
 
-@pytest.mark.parametrize('system', ['robot', 'fleet.of-two rovers', 'größe', '2', 'x' * 300])
+@pytest.mark.parametrize('system', ['fleet.of-two rovers', 'größe', '2', 'x' * 300])
 def test_every_system_has_a_node_with_a_valid_name(system):
     assert validate_node_name(node_name(system))
     assert node_name('fleet.of-two rovers') == '_composer_fleet_of_two_rovers'
@@ -223,15 +170,6 @@ def test_a_status_is_named_as_diagnostic_tools_expect_it():
     }
 
 
-def test_only_subscriptions_have_overruns_and_services_neither():
-    keys = {
-        owner: {pair.key for pair in status_of(owner).values}
-        for owner in (Owner('subscription', 'in'), Owner('service', 'ask'))
-    }
-    assert keys[Owner('subscription', 'in')] - keys[Owner('service', 'ask')] == {'queue overruns'}
-    assert not {'late ticks', 'skipped ticks', 'queue overruns'} & keys[Owner('service', 'ask')]
-
-
 @pytest.mark.parametrize(
     ('owner', 'arguments', 'level', 'message'),
     [
@@ -241,12 +179,6 @@ def test_only_subscriptions_have_overruns_and_services_neither():
             {'missed': MissedCounts(late_ticks=2)},
             DiagnosticStatus.OK,
             'not called',
-        ),
-        (
-            Owner('timer', 'a'),
-            {'missed': MissedCounts(late_ticks=3)},
-            DiagnosticStatus.WARN,
-            '3 late ticks',
         ),
         (
             Owner('timer', 'a'),
@@ -277,17 +209,3 @@ def test_only_subscriptions_have_overruns_and_services_neither():
 def test_the_level_and_the_message_tell_what_is_wrong(owner, arguments, level, message):
     status = status_of(owner, **arguments)
     assert (status.level, status.message) == (level, message)
-
-
-def test_a_status_is_right_again_when_the_period_was():
-    health = EntityHealth()
-    writer = StatusWriter('/a', Owner('timer', 'b'), 'robot')
-    health.note_error(ValueError('boom'))
-    assert writer.write(health.report(1.0, 0.0)).level == DiagnosticStatus.ERROR
-    health.times.add(3_000_000)
-    assert writer.write(health.report(1.0, 0.0)).level == DiagnosticStatus.OK
-    status = writer.write(health.report(1.0, 0.0))
-    values = {pair.key: pair.value for pair in status.values}
-    # Times are those of the last period with calls, the rate is that of the last period.
-    assert values['callback time mean (ms)'] == '3.0000'
-    assert (values['rate (Hz)'], values['errors']) == ('0.00', '1')

@@ -4,10 +4,6 @@ Each case publishes a message when it hears one of the topic `go`, and keeps wha
 all messages have arrived, `judge` changes what was kept and looks for whom else it has changed.
 """
 
-import copy
-import ctypes
-import threading
-import weakref
 from array import array
 from collections import defaultdict
 from functools import cache, partial
@@ -15,9 +11,9 @@ from functools import cache, partial
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseArray
-from sensor_msgs.msg import Image, Imu, JointState
+from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
-from test_msgs.msg import Arrays, BasicTypes, MultiNested, UnboundedSequences
+from test_msgs.msg import BasicTypes, UnboundedSequences
 
 # Who subscribes to the messages of a case; one alone gets the message itself.
 AUDIENCES = (('keep',), ('keep', 'write', 'read', 'read_on', 'write_relayed'))
@@ -173,33 +169,10 @@ def changes_it_later(node, go):
 
 
 @case(JointState)
-def changes_it_in_another_thread(node, go):
-    message = send(node, begin(go.data))
-    thread = threading.Thread(target=node.publish, args=('out', message))
-    thread.start()
-    thread.join()
-    change(message)
-
-
-@case(JointState)
-async def changes_it_as_a_coroutine(node, go):
-    message = send(node, begin(go.data))
-    later(message.name, message.position)
-    return message
-
-
-@case(JointState)
 def publishes_it_twice(node, go):
     message = send(node, begin(go.data))
     node.publish('out', message)
     return send(node, message)
-
-
-@case(JointState)
-def publishes_it_on_two_topics(node, go):
-    message = send(node, begin(go.data))
-    node.publish('out', message)
-    node.publish('other', message)
 
 
 @case(JointState)
@@ -210,32 +183,6 @@ def has_it_in_a_cache(node, go):
 @cache
 def cached():
     return hold(begin(1.0))
-
-
-@case(JointState)
-def has_it_in_arguments(node, go):
-    send(node, ARGUMENTS[1])
-    node.publish(*ARGUMENTS)
-    send(node, ARGUMENTS[1])
-    list(map(node.publish, ['out'], ARGUMENTS[1:]))
-
-
-ARGUMENTS = ('out', hold(begin(5.0)))
-
-
-@case(JointState)
-def has_it_in_a_traceback(node, go):
-    try:
-        publish_and_fail(node, go.data)
-    except KeyError as error:
-        kept = error
-        LATER.append(lambda: change(kept.__traceback__.tb_next.tb_frame.f_locals['message']))
-
-
-def publish_and_fail(node, number):
-    message = send(node, begin(number))
-    node.publish('out', message)
-    raise KeyError
 
 
 @case(JointState)
@@ -252,33 +199,12 @@ def forever(number):
         yield message
 
 
-@case(JointState)
-def lets_it_go(node, go):
-    return send(node, begin(go.data))
-
-
 @case(PoseArray)
 def has_one_pose_thrice(node, go):
     pose = Pose(position=Point(x=go.data))
     message = send(node, PoseArray(poses=[pose, pose, pose]))
     del pose
     return message
-
-
-@case(PoseArray)
-def copies_it_on_the_surface(node, go):
-    message = PoseArray(poses=[Pose(position=Point(x=go.data))])
-    later(message)
-    return send(node, copy.copy(message))
-
-
-@case(PoseArray)
-def has_parts_of_many_messages(node, go):
-    POSES.append(Pose(position=Point(x=go.data)))
-    return send(node, PoseArray(poses=POSES[:]))
-
-
-POSES = []
 
 
 @case(DiagnosticArray)
@@ -324,50 +250,9 @@ def has_a_view_of_the_array(node, go):
     return send(node, message)
 
 
-@case(Image)
-def finds_the_array_by_a_weak_reference(node, go):
-    message = Image(data=bytes(12))
-    weak = weakref.ref(message.data)
-    LATER.append(lambda: change(weak()))
-    return send(node, message)
-
-
-@case(Imu)
-def has_a_view_of_numpy(node, go):
-    message = Imu()
-    later(message.orientation_covariance.reshape(3, 3)[1])
-    return send(node, message)
-
-
-@case(Imu)
-def shows_memory_of_its_own(node, go):
-    message = Imu()
-    memory = (ctypes.c_double * 9)()
-    # As a class derived from the message may do.
-    message._orientation_covariance = np.ctypeslib.as_array(memory)
-    LATER.append(lambda: memory.__setitem__(0, 7.0))
-    return send(node, message)
-
-
-@case(Imu)
-def finds_numpy_by_a_weak_reference(node, go):
-    message = Imu()
-    weak = weakref.ref(message.orientation_covariance)
-    LATER.append(lambda: change(weak()))
-    return send(node, message)
-
-
 @case(UnboundedSequences)
 def has_one_list_in_two_fields(node, go):
     message = UnboundedSequences(string_values=['a'], basic_types_values=[BasicTypes()] * 2)
     message.string_values_default = message.string_values
     message.int8_values_default = message.int8_values = array('b', [1, 2])
-    return send(node, message)
-
-
-@case(MultiNested)
-def has_what_is_nested_deep(node, go):
-    message = MultiNested()
-    message.unbounded_sequence_of_arrays = [Arrays()] * 2
-    later(message.array_of_arrays[1].basic_types_values[0], message.array_of_arrays[2].byte_values)
     return send(node, message)

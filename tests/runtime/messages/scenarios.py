@@ -38,16 +38,12 @@ class Scenario:
     Attributes:
         steps: Lists of events: `burst` happens while the subscriptions are held, of the topics
             given and those behind; `trickle` is done one message after the other.
-        visitors: The subscriptions of other processes: their topics and policies.
-        outside: The publishers of other processes.
     """
 
     seed: int
     topics: int = 0
     publishers: dict[str, End] = field(default_factory=dict)
     subscriptions: dict[str, End] = field(default_factory=dict)
-    visitors: dict[str, tuple[int, dict, bool]] = field(default_factory=dict)
-    outside: dict[str, int] = field(default_factory=dict)
     steps: list[tuple] = field(default_factory=list)
 
     def render(self, *, is_local):
@@ -95,10 +91,6 @@ def _is_deep(qos):
     )
 
 
-def _is_reliable(qos):
-    return isinstance(qos, dict) and qos.get('reliability') == 'reliable'
-
-
 def create_scenario(seed):
     """Return the scenario of a seed."""
     return _Maker(seed).make()
@@ -123,7 +115,6 @@ class _Maker:
             for _ in range(chance.choice([1, 1, 2, 3, 4])):
                 self._add_subscription(chance.choice(nodes), topic, base)
         self._add_relays()
-        self._add_others()
         for _ in range(chance.randint(2, 5)):
             scenario.steps.append(self._step())
         return scenario
@@ -149,18 +140,6 @@ class _Maker:
             if behind and end.can_be_held and self._random.random() < 0.6:
                 end.relays_to = self._random.choice(behind)
                 end.copies = self._random.choice([1, 1, 2, 7])
-
-    def _add_others(self):
-        chance, scenario = self._random, self._scenario
-        for number in range(chance.choice([0, 1, 1, 2])):
-            topic = chance.randrange(scenario.topics)
-            policies = {'reliability': chance.choice(['reliable', 'best_effort']), 'depth': _MANY}
-            scenario.visitors[f'v{number}'] = (topic, policies, chance.random() < 0.3)
-        topic = chance.randrange(scenario.topics)
-        ends = [end.qos for end in scenario.subscriptions.values() if end.topic == topic]
-        # What others sent to a best-effort subscription need not have come at any time.
-        if chance.random() < 0.4 and all(_is_reliable(qos) for qos in ends):
-            scenario.outside['x0'] = topic
 
     def _policies(self):
         """Return policies for the ends of a topic, which may differ in some."""
@@ -196,35 +175,17 @@ class _Maker:
 
     def _step(self):
         chance, scenario = self._random, self._scenario
-        kind = chance.choice(['burst', 'burst', 'burst', 'trickle', 'flood', 'come and go'])
-        if kind == 'come and go':
-            return ('trickle', self._events(1, 3))
+        kind = chance.choice(['burst', 'burst', 'burst', 'trickle', 'flood'])
         if kind == 'burst':
             topics = sorted(
                 chance.sample(range(scenario.topics), chance.randint(1, scenario.topics))
             )
-            return ('burst', self._events(1, 15, topics), topics)
+            publishers = [name for name, end in scenario.publishers.items() if end.topic in topics]
+            events = [
+                (chance.choice(publishers), chance.randint(1, 15))
+                for _ in range(chance.randint(2, 7))
+            ]
+            return ('burst', events, topics)
         name = chance.choice(list(scenario.publishers))
         is_flood = kind == 'flood' and scenario.loses_nothing([scenario.publishers[name].topic])
-        return ('flood' if is_flood else 'trickle', [('publish', name, chance.randint(1, 20))])
-
-    def _events(self, least, most, topics=None):
-        """Return what happens on topics; any if None."""
-        chance, scenario = self._random, self._scenario
-        events = []
-
-        def is_there(topic):
-            return topics is None or topic in topics
-
-        publishers = [name for name, end in scenario.publishers.items() if is_there(end.topic)]
-        visitors = [name for name, (topic, *_) in scenario.visitors.items() if is_there(topic)]
-        outside = [name for name, topic in scenario.outside.items() if is_there(topic)]
-        for _ in range(chance.randint(2, 7)):
-            events.append(('publish', chance.choice(publishers), chance.randint(least, most)))
-            if visitors and chance.random() < 0.35:
-                events.append(('come or go', chance.choice(visitors)))
-            if outside and chance.random() < 0.35:
-                events.append(
-                    ('from outside', chance.choice(outside), chance.randint(least, most))
-                )
-        return events
+        return ('flood' if is_flood else 'trickle', [(name, chance.randint(1, 20))])

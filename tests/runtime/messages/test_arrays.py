@@ -1,7 +1,5 @@
 """Arrays in payloads, in the containers that people have them in."""
 
-import subprocess
-import sys
 from array import array
 from collections import deque
 from itertools import product
@@ -14,7 +12,7 @@ pytest.importorskip('rclpy')
 import numpy as np
 from geometry_msgs.msg import PoseWithCovariance
 from sensor_msgs.msg import CompressedImage, Image, JointState, LaserScan
-from std_msgs.msg import ByteMultiArray, Float64MultiArray, Int8MultiArray, UInt8MultiArray
+from std_msgs.msg import ByteMultiArray, Float64MultiArray, Int8MultiArray
 from test_msgs.msg import Arrays, BoundedSequences, UnboundedSequences
 
 from tests.runtime.messages.test_payloads import convert, finding, received
@@ -74,11 +72,8 @@ def test_all_else_arrives_as_well(message_class):
     'octets',
     [
         b'\x00\xff',
-        bytearray(b'\x00\xff'),
-        memoryview(b'\x00\xff'),
         array('B', [0, 255]),
         memoryview(b'\x00x\xffx')[::2],
-        np.array([0, 255], np.uint8),
         np.array([0, 255]),
     ],
 )
@@ -92,11 +87,8 @@ def test_octets_arrive_from_whatever_holds_octets(octets):
     ('given', 'got'),
     [
         (b'\x01', "bytes b'\\x01'"),
-        (bytearray(b'\x01'), "bytearray bytearray(b'\\x01')"),
         ('a', "str 'a'"),
-        (5, 'int 5'),
         (np.array(5), 'int 5'),
-        ({1}, 'set {1}'),
         (None, 'None'),
     ],
 )
@@ -136,28 +128,17 @@ def test_empty_arrays_have_no_items_of_a_wrong_type():
     [
         ('int8', [0, 1, 128], '[2]: expected int8 (-128 to 127), got int 128'),
         ('uint8', [0, -1, 1], '[1]: expected uint8 (0 to 255), got int -1'),
-        (
-            'uint64',
-            [0, 2**64, 1],
-            ('[1]: expected uint64 (0 to 18446744073709551615), got int 18446744073709551616'),
-        ),
         ('int8', [0, True, 1], '[1]: expected int8, got bool True'),
-        ('int8', [0, 1.0, 1], '[1]: expected int8, got float 1.0'),
         ('uint8', np.array([0, -1, 1]), '[1]: expected uint8 (0 to 255), got int -1'),
         ('int8', np.array([0.0, 1.0, 1.0]), '[0]: expected int8, got float 0.0'),
-        ('int8', np.array([True, False, True]), '[0]: expected int8, got bool True'),
-        ('float64', [0.0, 1, True], '[2]: expected float64, got bool True'),
         ('float64', np.array([True, False, True]), '[0]: expected float64, got bool True'),
         ('float64', [0.0, 1, 10**400], '[2]: expected float64, got an integer beyond its range'),
-        ('float64', np.array([1j, 1, 1]), '[0]: expected float64, got complex 1j'),
-        ('float32', [0, 1e39, 1], '[1]: expected float32 (up to 3.402823e+38), got float 1e+39'),
         (
             'float32',
             np.array([0, 1e39, 1]),
             '[1]: expected float32 (up to 3.402823e+38), got float 1e+39',
         ),
         ('bool', [True, 1, True], '[1]: expected bool, got int 1'),
-        ('byte', [0, 256, 0], '[1]: expected byte (0 to 255), got int 256'),
         (
             'basic_types',
             [{}, {'int8_value': 300}, {}],
@@ -172,7 +153,7 @@ def test_the_first_wrong_item_is_named(name, given, expected):
         )
 
 
-@pytest.mark.parametrize('name', ['bool', 'byte', 'float32', 'uint8', 'string'])
+@pytest.mark.parametrize('name', ['bool', 'float32', 'string'])
 @pytest.mark.parametrize('container', [list, np.array])
 def test_the_number_of_items_is_checked(name, container):
     item = {'bool': True, 'string': 'a'}.get(name, 1)
@@ -242,23 +223,3 @@ def test_octets_in_a_message_are_brought_into_the_form_that_subscribers_see():
     fixed = Arrays(byte_values=[1, 2, 3])
     convert(Arrays, fixed)
     assert received(fixed).byte_values == [b'\x01', b'\x02', b'\x03']
-
-
-def test_what_was_given_is_not_shared_with_the_message():
-    numbers = [1, 2]
-    pixels = np.zeros(2, np.uint8)
-    first = convert(Int8MultiArray, {'data': numbers})
-    second = convert(UInt8MultiArray, {'data': pixels})
-    numbers[0] = pixels[0] = 9
-    assert (first.data.tolist(), second.data.tolist()) == ([1, 2], [0, 0])
-
-
-def test_numpy_is_not_imported_for_messages_without_fixed_arrays():
-    code = (
-        'import sys\n'
-        'from std_msgs.msg import Float64MultiArray\n'
-        'from composer.runtime.messages.payloads import converter_for\n'
-        "converter_for(Float64MultiArray).convert({'data': [1, 2.5]})\n"
-        "assert 'numpy' not in sys.modules\n"
-    )
-    subprocess.run([sys.executable, '-c', code], check=True, timeout=200)

@@ -2,8 +2,7 @@
 
 import weakref
 from array import array
-from collections import OrderedDict, UserDict
-from math import pi
+from collections import UserDict
 
 import pytest
 
@@ -17,7 +16,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time as RclpyTime
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Bool, Byte, Char, Empty, Float64, Header, Int32, String
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 from test_msgs.action import NestedMessage
 from test_msgs.message_fixtures import get_test_msg
 from test_msgs.msg import BasicTypes, Builtins, Nested, Strings, WStrings
@@ -56,13 +55,10 @@ def finding(message_class, payload):
     ('message_class', 'payload', 'data'),
     [
         (String, 'hello', 'hello'),
-        (String, '', ''),
         (Bool, True, True),
         (Int32, -5, -5),
-        (Float64, 2.5, 2.5),
         (Float64, 2, 2.0),
         (Byte, 7, b'\x07'),
-        (Byte, b'\x07', b'\x07'),
         (Char, 7, 7),
     ],
 )
@@ -73,18 +69,10 @@ def test_a_bare_value_is_the_one_field(message_class, payload, data):
     assert type(message.data) is type(data)
 
 
-@pytest.mark.parametrize('mapping', [dict, OrderedDict, UserDict])
+@pytest.mark.parametrize('mapping', [dict, UserDict])
 def test_a_mapping_names_fields_and_leaves_the_rest_at_their_defaults(mapping):
     message = received(convert(Twist, mapping({'linear': mapping(x=1, z=0.5)})))
     assert message == Twist(linear=Vector3(x=1.0, y=0.0, z=0.5))
-
-
-def test_a_mapping_names_the_fields_of_the_message_itself_even_where_there_is_one():
-    assert convert(String, {'data': 'x'}) == String(data='x')
-    assert failure(Polygon, {'x': 1}) == (
-        "geometry_msgs/msg/Polygon has no field 'x'",
-        'its fields are points',
-    )
 
 
 def test_nested_messages_are_given_in_all_three_ways():
@@ -111,17 +99,9 @@ def test_a_bare_list_is_the_one_array():
     assert polygon == Polygon(points=[Point32(x=1.0), Point32(y=2.0)])
 
 
-@pytest.mark.parametrize('message_class', [Empty, Trigger.Request])
 @pytest.mark.parametrize('payload', [{}, None])
-def test_an_empty_message_is_an_empty_mapping_or_none(message_class, payload):
-    assert convert(message_class, payload) == message_class()
-
-
-def test_the_parts_of_services_and_actions_are_messages_too():
-    assert convert(SetBool.Request, True) == SetBool.Request(data=True)
-    assert convert(SetBool.Response, {'success': True, 'message': 'on'}) == (
-        SetBool.Response(success=True, message='on')
-    )
+def test_an_empty_message_is_an_empty_mapping_or_none(payload):
+    assert convert(Trigger.Request, payload) == Trigger.Request()
 
 
 def test_the_times_of_rclpy_stand_for_their_messages():
@@ -193,10 +173,6 @@ def test_what_a_message_holds_in_another_form_is_replaced_in_place():
             ),
         ),
         (
-            Twist(linear=None),
-            ('geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, got None'),
-        ),
-        (
             Polygon(points=[Point32(), Point32(z=None)]),
             'geometry_msgs/msg/Polygon: points[1].z: expected float32, got None',
         ),
@@ -217,24 +193,6 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message, finding):
         ),
         (
             Twist,
-            {'linear': {'w': 1}},
-            "geometry_msgs/msg/Twist: linear: geometry_msgs/msg/Vector3 has no field 'w'",
-            'its fields are x, y, z',
-        ),
-        (
-            Twist,
-            {'linear': {'x': 'fast'}},
-            "geometry_msgs/msg/Twist: linear.x: expected float64, got str 'fast'",
-            None,
-        ),
-        (
-            Twist,
-            1.0,
-            'expected geometry_msgs/msg/Twist, got float 1.0',
-            'give its fields by name: linear, angular',
-        ),
-        (
-            Twist,
             {'linear': [1, 2, 3]},
             (
                 'geometry_msgs/msg/Twist: linear: expected geometry_msgs/msg/Vector3, '
@@ -248,7 +206,6 @@ def test_a_wrong_message_is_refused_before_rclpy_trusts_it(message, finding):
             'expected geometry_msgs/msg/Twist, got geometry_msgs/msg/Vector3',
             'give its fields by name: linear, angular',
         ),
-        (String, None, 'std_msgs/msg/String: data: expected string, got None', None),
         (Empty, 0, 'expected std_msgs/msg/Empty, got int 0', 'it has no fields: write {}'),
         (
             Polygon,
@@ -289,33 +246,6 @@ def test_text_arrives_as_it_was_given():
     )
     assert wide.wstring_value == 'a\0😀'
     assert list(wide.array_of_wstrings) == ['ü', '', 'ハ']
-
-
-def test_every_kind_of_single_value_arrives_as_it_was_given():
-    values = {
-        'bool_value': True,
-        'byte_value': 255,
-        'char_value': 255,
-        'float32_value': 0.5,
-        'float64_value': pi,
-        'int8_value': -128,
-        'uint8_value': 255,
-        'int16_value': -(2**15),
-        'uint16_value': 2**16 - 1,
-        'int32_value': -(2**31),
-        'uint32_value': 2**32 - 1,
-        'int64_value': -(2**63),
-        'uint64_value': 2**64 - 1,
-    }
-    message = received(convert(BasicTypes, values))
-    for name, value in values.items():
-        assert getattr(message, name) == (b'\xff' if name == 'byte_value' else value), name
-
-
-def test_a_given_mapping_is_not_changed():
-    payload = {'linear': {'x': 1}, 'angular': Vector3()}
-    convert(Twist, payload)
-    assert payload == {'linear': {'x': 1}, 'angular': Vector3()}
 
 
 def test_a_converter_is_compiled_once():
