@@ -167,10 +167,7 @@ def test_qos_by_depth_is_otherwise_the_default_of_ros(publisher_of, topic):
 
     assert profile.reliability is ReliabilityPolicy.RELIABLE
     assert profile.durability is DurabilityPolicy.VOLATILE
-    assert profile.liveliness is LivelinessPolicy.AUTOMATIC
     assert profile.deadline == Infinite
-    assert profile.lifespan == Infinite
-    assert profile.liveliness_lease_duration == Infinite
 
 
 def test_qos_by_policies_starts_from_its_profile_and_differs_where_it_says(publisher_of):

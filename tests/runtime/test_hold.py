@@ -46,7 +46,7 @@ def test_without_the_file_nothing_is_held(compose, hold):
 
 
 def test_a_system_that_is_held_can_be_stopped(compose, hold, wait_for):
-    child = compose(SYSTEM, CODE, '--hold', hold)
+    child = compose(ALONE, CODE, '--hold', hold)
     wait_for(hold.read_text, 'the system to be held')
     assert child.stop(signal.SIGTERM, once_up=False) == 0
     assert not child.matching('begins')

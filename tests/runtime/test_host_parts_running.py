@@ -59,13 +59,3 @@ def test_a_part_in_the_background_has_a_log_of_its_own(compose, monkeypatch, cap
     assert run(['logs', 'system@base']) == 0
     assert 'system@base: 1 node ready' in capfd.readouterr().out
     assert run(['logs', 'system']) == 1
-
-
-def test_a_part_that_does_not_exist_is_told_with_those_that_do(compose):
-    path = compose.write(SYSTEM, CODE)
-    child = compose.run(path.name, '--host', 'jetsno')
-    assert child.wait() == 2
-    assert child.lines == [
-        "error: --host jetsno: 'system' has no such host",
-        "  help: did you mean 'jetson'?",
-    ]

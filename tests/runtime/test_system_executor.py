@@ -13,7 +13,7 @@ from composer.runtime.nodes.callback_groups import (
     GatedMutuallyExclusiveGroup,
 )
 from composer.runtime.stop_request import StopRequest
-from composer.runtime.system_executor import NoResponseError, SystemExecutor
+from composer.runtime.system_executor import SystemExecutor
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300, method='thread')]
 DEADLINE_SEC = 90.0
@@ -73,16 +73,6 @@ def test_as_many_callbacks_run_at_a_time_as_there_may_be_now(system_executor, no
         assert max(most) == (threads or 5)
 
 
-def test_a_call_later_comes_and_a_cancelled_one_does_not(system_executor, wait_for):
-    called = []
-    cancelled = system_executor.call_later(0.02, lambda: called.append('cancelled'))
-    cancelled.cancel()
-    system_executor.call_later(0.05, lambda: called.append('kept'))
-
-    wait_for(lambda: called, 'the call')
-    assert called == ['kept']
-
-
 def test_a_finding_is_logged_once_and_dispatching_goes_on(system_executor, node, wait_for):
     ticks = []
 
@@ -96,15 +86,3 @@ def test_a_finding_is_logged_once_and_dispatching_goes_on(system_executor, node,
     wait_for(lambda: len(ticks) > 5, 'ticks after the finding')
     assert len(system_executor.logged) == 1
     assert system_executor.logged[0].endswith('ValueError')
-
-
-def test_a_missing_response_is_no_finding(system_executor):
-    def give_none():
-        reason = 'its behaviour raised'
-        raise NoResponseError(reason)
-
-    done = threading.Event()
-    system_executor.create_task(give_none).add_done_callback(lambda _: done.set())
-
-    assert done.wait(DEADLINE_SEC)
-    assert system_executor.logged == []

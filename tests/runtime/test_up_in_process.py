@@ -126,36 +126,6 @@ def test_many_systems_in_a_row_leave_nothing_behind(compose, run_program):
     }
 
 
-def test_starts_that_fail_leave_nothing_behind(compose, run_program):
-    path = compose.write(
-        f'{SYSTEM}    on_start: parts:fail\n',
-        f'{CODE}\ndef fail(node):\n    look(node)\n    raise OSError("no such device")\n',
-    )
-    program = """
-import json, os, sys, threading
-import composer
-
-errors = []
-for _ in range(3):
-    try:
-        composer.up(sys.argv[1])
-    except Exception as error:
-        errors.append(f'{type(error).__name__}: {error}')
-import parts
-print(json.dumps([
-    errors,
-    [thread.name for thread in threading.enumerate()],
-    [name for name in parts.files if os.path.exists(name)],
-]))
-"""
-    errors, threads, left = json.loads(run_program(program, path.name))
-
-    message = "node 'listener': on_start raised OSError('no such device')"
-    assert errors == [f'StartError: {message}'] * 3
-    assert threads == ['MainThread']
-    assert left == []
-
-
 def test_all_is_as_before_when_a_system_has_ended_that_had_arguments(compose, run_program):
     text = SYSTEM.replace('  talker:\n', '  talker:\n    log_level: error\n')
     text = text.replace('parts:look', 'parts:tell').replace(

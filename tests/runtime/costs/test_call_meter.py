@@ -9,7 +9,6 @@ import pytest
 
 from composer.runtime.costs import call_meter
 from composer.runtime.costs.call_meter import CallMeter
-from composer.runtime.costs.process_costs import ProcessMeter
 from tests.running import DEADLINE_SEC
 
 ENOUGH_NS = 10_000_000
@@ -102,19 +101,6 @@ def test_short_calls_share_what_they_have_used_by_how_long_they_took(monkeypatch
         assert long.cpu_ns >= ENOUGH_NS - 200_000
 
 
-def test_a_thread_that_sleeps_uses_nothing_and_one_that_is_new_has_no_mark():
-    given = []
-    with measuring() as meter:
-        charge(meter)
-        time.sleep(0.05)
-        given.append(charge(meter))
-        new = threading.Thread(target=lambda: (loop(), given.append(charge(meter))))
-        new.start()
-        new.join()
-    assert given[0] < ENOUGH_NS
-    assert given[1] == 0
-
-
 def test_a_call_that_does_not_end_is_measured_from_outside():
     costs = SimpleNamespace(cpu_ns=0)
 
@@ -136,11 +122,3 @@ def test_who_wants_the_interpreter_beside_a_loop_waits_for_it():
 
     with measuring() as meter, running(loop):
         wait_until(is_waited_for, 'waits')
-
-
-def test_nothing_is_measured_any_more_when_it_is_turned_off():
-    before = threading.active_count()
-    with measuring():
-        assert threading.active_count() == before + 1
-    assert threading.active_count() == before
-    assert ProcessMeter().take(1.0).waits is None

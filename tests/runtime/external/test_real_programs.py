@@ -29,9 +29,6 @@ import composer
 def heard(node, message):
     node.logger.info(f'heard {message.data}')
 
-def add(node):
-    node.logger.info(f"sum {node.call('add_two_ints', {'a': 2, 'b': 3}).sum}")
-
 def goals(node):
     goal = node.send_goal('fibonacci', {'order': 4})
     count = sum(1 for _ in goal.feedback)
@@ -82,18 +79,6 @@ def loaded(peer):
     return lambda: sorted(peer.call(ListNodes, '/c/_container/list_nodes').full_node_names)
 
 
-@pytest.fixture
-def edit(compose):
-    """Write the system anew, as an editor does."""
-
-    def write(*arguments, **keys):
-        beside = compose.folder / 'system.new'
-        beside.write_text(system(*arguments, **keys))
-        beside.replace(compose.folder / 'system.yaml')
-
-    return write
-
-
 def ask(*words):
     command = [sys.executable, '-m', 'composer', *words]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -113,29 +98,6 @@ def test_components_run_whatever_the_container(compose, loaded, kind):
     assert child.stop() == 0
 
 
-def test_edits_load_and_unload_components(compose, loaded, edit):
-    edit({'talker': talker()})
-    child = compose.run('system.yaml', '--watch')
-    child.wait_until_ready()
-    edit({'talker': talker(namespace='there'), 'listener': listener()})
-    child.wait_for_line('reloaded in ')
-    assert loaded() == ['/listener', '/there/talker']
-    edit({})
-    child.wait_for_line('reloaded in ', times=2)
-    assert loaded() == []
-    assert child.stop() == 0
-
-
-def test_a_container_that_is_killed_gets_its_components_again(compose, loaded, edit):
-    edit({'talker': talker(), 'listener': listener()})
-    child = compose.run('system.yaml')
-    child.wait_until_ready()
-    os.kill(find_process('component_conta', compose.domain_id), signal.SIGKILL)
-    child.wait_for_line("container 'c': 2 components were loaded again")
-    assert loaded() == ['/listener', '/talker']
-    assert child.stop() == 0
-
-
 def find_process(start, domain):
     """Return the one process of a domain whose name begins like this."""
 
@@ -151,71 +113,6 @@ def find_process(start, domain):
         is_it, filter(str.isdecimal, (entry.name for entry in Path('/proc').iterdir()))
     )
     return int(pid)
-
-
-def test_plugins_keep_their_names_and_levels_cost_no_time(compose, loaded):
-    levels = {'log_level': 'warn'}
-    components = {'one': talker(name=None, **levels), 'two': listener(namespace='x', **levels)}
-    child = compose(system(components))
-    child.wait_for_line('2 components and 1 process ready in ')
-    assert loaded() == ['/talker', '/x/two']
-    assert len(child.matching('has no services for log levels')) <= 1
-    assert child.stop() == 0
-
-
-def test_parameters_of_all_types_reach_programs_and_components(compose):
-    values = {
-        'flag': True,
-        'whole': 2**62,
-        'real': 1.0e-7,
-        'text': 'on',
-        'texts': ['~', '1e3', ''],
-        'reals': [1.0, 2.5],
-        'deep': {'er': [1, 2]},
-    }
-    blackboard = {'package': 'demo_nodes_cpp', 'parameters': values}
-    processes = {'board': {**blackboard, 'executable': 'parameter_blackboard', 'name': 'board'}}
-    components = {'inside': {**blackboard, 'plugin': 'demo_nodes_cpp::ParameterBlackboard'}}
-    code = """
-def ask(node):
-    names = ['flag', 'whole', 'real', 'text', 'texts', 'reals', 'deep.er']
-    for other in ('board', 'inside'):
-        values = node.get_parameters(other, names)
-        node.logger.info(f'{other}: {[values[name] for name in names]}')
-"""
-    nodes = {
-        'asks': {'wait_for': [{'node': 'inside'}, {'node': 'board'}], 'on_start': 'parts:ask'}
-    }
-    child = compose(system(components, processes=processes, nodes=nodes), code)
-    for name in ('board', 'inside'):
-        line = child.wait_for_line(f'[asks]: {name}: ')
-        assert line.endswith(
-            "[True, 4611686018427387904, 1e-07, 'on', ['~', '1e3', ''], [1.0, 2.5], [1, 2]]"
-        )
-    child.wait_until_ready()
-    assert child.stop() == 0
-
-
-def test_a_service_answers(compose):
-    processes = {
-        'adder': {
-            'package': 'demo_nodes_cpp',
-            'executable': 'add_two_ints_server',
-            'name': 'adder',
-        }
-    }
-    clients = {'add_two_ints': {'type': 'example_interfaces/srv/AddTwoInts', 'external': True}}
-    nodes = {
-        'asks': {
-            'service_clients': clients,
-            'wait_for': {'service': 'add_two_ints'},
-            'on_start': 'parts:add',
-        }
-    }
-    child = compose(system(processes=processes, nodes=nodes), CODE)
-    child.wait_for_line('[asks]: sum 5')
-    child.wait_until_ready()
-    assert child.stop() == 0
 
 
 @pytest.mark.parametrize('is_killed', [False, True])

@@ -8,10 +8,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.application.timelines import read_trace
 from composer.cli.main import run
-from composer.errors import ComposerError
-from composer.runtime.health.system_state import Outcome
 from composer.runtime.tracing import tracer as module
 from composer.runtime.tracing.timeline import Timeline
 from composer.runtime.tracing.tracer import TracePart, Tracer
@@ -242,9 +239,3 @@ def test_a_trace_is_bounded(monkeypatch):
         .summarize()
         .endswith('1 more events were left out: trace for a shorter time')
     )
-
-
-def test_a_trace_that_cannot_be_read_is_asked_for_once():
-    failed = iter([Outcome(succeeded=True, text='eJ'), Outcome(succeeded=False, text='it failed')])
-    with pytest.raises(ComposerError, match='it failed'):
-        read_trace(lambda _timeout_sec: next(failed))

@@ -23,10 +23,6 @@ CODE = """
             time.sleep(0.01)
         fail(node)
 
-    def wait(node):
-        print(f'{node.name} waits', flush=True)
-        time.sleep(3600)
-
     def count(node):
         node.state.count += 1
         return {'data': f'{node.state.count} of {os.getpid()}'}

@@ -66,9 +66,7 @@ def waiter(worker, behaviour):
 def test_what_waits_for_a_killed_server_has_an_error(compose):
     waiters = {
         'here': waiter('', 'wait_for_response'),
-        'far': waiter('right', 'wait_for_response'),
         'awaits': waiter('right', 'await_response'),
-        'goal_here': waiter('', 'wait_for_result'),
         'goal_far': waiter('right', 'wait_for_result'),
     }
     nodes = {'server': node('left', *SERVERS), **waiters}
@@ -86,8 +84,6 @@ ENDLESS = """
 
     CALLS = {
         'ask': lambda node: node.call('set', True, timeout=None).message,
-        'made': lambda node: node.call('made', True, timeout=None).message,
-        'raw': lambda node: node.call('raw', True, timeout=None).message,
         'goal': lambda node: send(node).result(timeout=None).sequence[0],
         'read': lambda node: read(node),
     }
@@ -101,12 +97,6 @@ ENDLESS = """
     def begin_to_serve(node):
         begin(node)
         node.ros.set_parameters([Parameter('pid', value=os.getpid())])
-        node.create_service('std_srvs/srv/SetBool', 'made', answer)
-        node.ros.create_service(SetBool, 'raw', fill)
-
-    def fill(request, response):
-        response.message = str(os.getpid())
-        return response
 
     def answer(node, request):
         return {'message': str(os.getpid())}
@@ -133,18 +123,14 @@ ENDLESS = """
                 print(f'{node.name} has {type(error).__name__}', flush=True)
             time.sleep(0.1)
 """
-ASKS = [('', 'ask'), ('', 'goal'), *(('right', what) for what in ('await', 'made', 'raw', 'read'))]
+ASKS = [('', 'ask'), ('', 'goal'), ('right', 'await'), ('right', 'read')]
 
 
 def asking(worker, what):
     """Return a node that asks again and again, each time until it has an answer."""
-    clients = ', '.join(
-        f'{name}: {{type: std_srvs/srv/SetBool, external: true}}'
-        for name in ('set', 'made', 'raw')
-    )
     behaviour = 'ask_for_ever_async' if what == 'await' else 'ask_for_ever'
     timer = f'{{period: 0.1, behaviour: "parts:{behaviour}", with: {{what: {what}}}}}'
-    ends = f'service_clients: {{{clients}}}', CLIENTS[1], f'timers: {{t: {timer}}}'
+    ends = *CLIENTS, f'timers: {{t: {timer}}}'
     return node(worker, 'warn_after: null', *ends)
 
 
@@ -158,7 +144,7 @@ def test_calls_that_begin_after_a_kill_reach_the_server_that_comes_back(compose)
     asks = {f'{what}_{worker or "here"}': asking(worker, what) for worker, what in ASKS}
     nodes = {'server': server, **asks}
     restart = 'workers: {left: {restart: {when: always, delay: 2}}}\n'
-    imports = '    from rclpy.parameter import Parameter\n    from std_srvs.srv import SetBool\n'
+    imports = '    from rclpy.parameter import Parameter\n'
     child = compose(system(nodes, restart), CODE + imports + MORE + ENDLESS)
     child.wait_until_ready()
     for turn in (1, 2):
