@@ -4,16 +4,13 @@ They are those of the package `stand_in`, and of any other there are none:
 
 - `stand_in::Talker` publishes its parameter `word` on `chatter`.
 - `stand_in::Slow` takes as long as a file `slow` is there.
-- `stand_in::Broken` raises in its constructor; with a file `mended` it does not.
+- `stand_in::Broken` raises in its constructor.
 - `stand_in::Managed` has a lifecycle.
-- `stand_in::Deadly` ends the process while it is loaded, unless there is a file `mended`; with a
-  file `once`, there is one the next time.
 
 As those of Jazzy, they have no services for the levels of their loggers; with a file `levels`, they
 have them, as those of Kilted.
 """
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -54,26 +51,15 @@ class Slow(Talker):
 
 class Broken(Talker):
     def __init__(self, name, **options):
-        if not Path('mended').exists():
-            message = 'no such device'
-            raise RuntimeError(message)
-        super().__init__(name, **options)
-
-
-class Deadly(Talker):
-    def __init__(self, name, **options):
-        if not Path('mended').exists():
-            if Path('once').exists():
-                Path('mended').touch()
-            os._exit(7)
-        super().__init__(name, **options)
+        message = 'no such device'
+        raise RuntimeError(message)
 
 
 class Managed(LifecycleNode):
     pass
 
 
-KINDS = (Talker, Slow, Broken, Deadly, Managed)
+KINDS = (Talker, Slow, Broken, Managed)
 CLASSES = {f'stand_in::{each.__name__}': each for each in KINDS}
 CLASSES['composition::Talker'] = Talker
 

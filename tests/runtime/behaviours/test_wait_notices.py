@@ -1,18 +1,9 @@
 """What is not there yet is named while it is waited for, without any stack."""
 
-import threading
-from contextlib import nullcontext
-from time import monotonic_ns
-from types import SimpleNamespace
-
 import pytest
 
 pytest.importorskip('rclpy')
 
-from composer.runtime.behaviours.running_calls import Owner, RunningCall, RunningCalls
-from composer.runtime.behaviours.waits import WaitNotice, Waits
-from composer.runtime.health.hangs import HangLimit
-from composer.runtime.stop_request import StopRequest
 
 pytestmark = pytest.mark.ros
 
@@ -99,35 +90,3 @@ def test_a_server_that_is_not_there_in_time_is_an_error_without_a_stack(compose)
         "no server of the action '/robot/count' appeared within 0.01 s"
     )
     assert not child.matching('Traceback')
-
-
-def test_a_wait_for_what_is_not_there_does_not_count_as_running(wait_for):
-    """A call that went on after a long wait was reported at once, with its stack."""
-    owner, hour_ns = Owner('on_start'), int(3600e9)
-    running, warnings, present, over = RunningCalls(), [], threading.Event(), threading.Event()
-    limit = HangLimit(owner, lambda: 'system.yaml:7', 3600.0, warnings.append)
-    notice = WaitNotice(lambda _line: None, 'service')
-    waits, begun = Waits(SimpleNamespace(waiting=nullcontext), StopRequest()), threading.Event()
-
-    def is_present():
-        begun.set()
-        return present.is_set()
-
-    def behave():
-        waits.until_true(is_present, None, notice)
-        begun.clear()
-        over.wait()
-
-    thread = threading.Thread(target=behave)
-    thread.start()
-    token, call = 0, RunningCall(owner, monotonic_ns() - 2 * hour_ns, thread.ident)
-    running.entries[token] = (owner, call.begun_ns, thread.ident, None, None)
-    wait_for(begun.is_set, 'the wait')
-    limit.check(running, token, call)
-    present.set()
-    wait_for(lambda: not begun.is_set(), 'the end of the wait')
-    limit.check(running, token, call)
-    over.set()
-    thread.join()
-
-    assert warnings == []

@@ -1,4 +1,4 @@
-"""The other end of a bond, for managers and plain nodes; it behaves as `bondcpp` does."""
+"""The other end of a bond; it behaves as `bondcpp` does."""
 
 import uuid
 from pathlib import Path
@@ -25,7 +25,7 @@ def import_status():
 class Bond:
     """One end; `is_formed` and `is_broken` tell how it stands."""
 
-    def __init__(self, node, name, timeout_sec, group=None):
+    def __init__(self, node, name, timeout_sec):
         self._status = import_status()
         self._node, self._name, self._timeout_sec = node, name, timeout_sec
         self._instance = str(uuid.uuid4())
@@ -33,10 +33,8 @@ class Bond:
         self._has_died = False
         self.instances = set()
         self._publisher = node.create_publisher(self._status, 'bond', 5)
-        self._subscription = node.create_subscription(
-            self._status, 'bond', self._hear, 100, callback_group=group
-        )
-        self._timer = node.create_timer(HEARTBEAT_PERIOD_SEC, self._beat, callback_group=group)
+        self._subscription = node.create_subscription(self._status, 'bond', self._hear, 100)
+        self._timer = node.create_timer(HEARTBEAT_PERIOD_SEC, self._beat)
 
     @property
     def is_formed(self):

@@ -1,15 +1,11 @@
 """A plain managed node of rclpy: `managed_program.py NAME [KEY=OUTCOME]…`.
 
-KEY is a callback, as `on_configure`; OUTCOME is `failure`, `error`, `exit` or `hang`. A file
-`outcomes/NAME.KEY` in the current folder says so, too, for as long as it is there. With `bond=yes`
-it keeps a bond while it is active.
+KEY is a callback, as `on_configure`; OUTCOME is `failure` or `error`.
 """
 
 import os
 import sys
-import threading
 from contextlib import suppress
-from pathlib import Path
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -24,8 +20,6 @@ OUTCOMES = dict(argument.split('=') for argument in sys.argv[2:] if '=' in argum
 
 
 class Managed(LifecycleNode):
-    bond = None
-
     def _LifecycleNodeMixin__change_state(self, transition):  # noqa: N802 - rclpy's name for it
         # As rclcpp: in rclpy 7 a transition that the state does not have ends the program.
         try:
@@ -37,12 +31,6 @@ class Managed(LifecycleNode):
         sys.stdout.write(f'{key}\n')
         sys.stdout.flush()
         outcome = OUTCOMES.get(key, '')
-        with suppress(OSError):
-            outcome = Path('outcomes', f'{NAME}.{key}').read_text().strip()
-        if outcome == 'exit':
-            os._exit(3)
-        if outcome == 'hang':
-            threading.Event().wait()
         if outcome == 'error':
             raise OSError(key)
         good = outcome != 'failure'
@@ -52,19 +40,10 @@ class Managed(LifecycleNode):
         return self.end('on_configure')
 
     def on_activate(self, state):
-        result = self.end('on_activate')
-        if result == TransitionCallbackReturn.SUCCESS and 'bond' in OUTCOMES:
-            from tests.runtime.lifecycle.bonds import Bond
-
-            self.bond = Bond(self, NAME, float('inf'))
-        return result
+        return self.end('on_activate')
 
     def on_deactivate(self, state):
-        result = self.end('on_deactivate')
-        if result == TransitionCallbackReturn.SUCCESS and self.bond:
-            self.bond.end()
-            self.bond = None
-        return result
+        return self.end('on_deactivate')
 
     def on_cleanup(self, state):
         return self.end('on_cleanup')
@@ -74,7 +53,7 @@ sys.stdout.write(f'pid {os.getpid()}\n')
 sys.stdout.flush()
 rclpy.init()
 node = Managed(NAME)
-# See manager.py.
+# rclpy's ends with an error where another thread destroys what it waits for.
 executor = ComposerExecutor()
 executor.add_node(node)
 with suppress(KeyboardInterrupt, ExternalShutdownException):

@@ -52,24 +52,17 @@ def test_nodes_are_driven_in_order_and_again_after_a_restart(compose, peer, wait
     assert child.stop() == 0
 
 
-def test_a_node_that_refuses_fails_its_process(compose):
-    child = compose(system(lidar=process('lidar', 'on_activate=error', on_exit='shutdown')))
+def test_a_node_that_refuses_fails_its_process_and_is_left_as_it_is_without_a_rule(compose):
+    strict = process(
+        'lidar',
+        'on_activate=error',
+        on_exit='shutdown',
+        wait_for={'node': '/camera', 'state': 'inactive'},
+    )
+    child = compose(system(camera=process('camera', 'on_activate=failure'), lidar=strict))
+    child.wait_for_line("node '/camera' refused to activate: it is inactive")
     child.wait_for_line(
         "[ERROR] [composer]: process 'lidar': node '/lidar' refused to activate: "
         'it is unconfigured'
     )
-    assert child.wait() == 1
-
-
-def test_a_node_that_refuses_is_left_as_it_is_without_a_rule(compose, peer):
-    child = compose(system(lidar=process('lidar', 'on_activate=failure')))
-    child.wait_for_line("node '/lidar' refused to activate: it is inactive")
-    assert state_of(peer, 'lidar') == 'inactive'
-    assert child.stop() == 0
-
-
-def test_a_process_that_dies_in_a_transition_is_driven_again(compose):
-    lidar = process('lidar', 'on_configure=exit', restart={'delay': 0, 'max': 1})
-    child = compose(system(lidar=lidar))
-    child.wait_for_line('[lidar] on_configure', times=2)
     assert child.wait() == 1

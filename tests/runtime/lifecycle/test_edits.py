@@ -57,10 +57,14 @@ def ask(capsys):
     return ask
 
 
-def test_edits_are_applied_in_every_state_and_keep_it(compose, peer):
+def test_edits_are_applied_in_every_state_and_keep_it(compose, peer, ask):
     child = compose(SYSTEM, CODE, '--watch')
     child.wait_until_ready()
+    (system,) = ask('ps')['systems']
+    assert system['lifecycles'] == {'/lidar': 'unconfigured'}
     peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
+    rows = [each for each in ask('top', '--once')['entities'] if each['kind'] == 'lifecycle']
+    assert [(each['node'], each['name']) for each in rows] == [('/lidar', 'inactive')]
     # While it rests: a timer that comes rests, too, and a behaviour is another one.
     edit(
         compose,
@@ -115,15 +119,4 @@ def test_an_edit_that_cannot_come_back_to_its_state_is_undone(compose, peer):
     ticks = len(child.matching('[lidar]: tick'))
     wait_for(lambda: state_of(peer) == 'active', 'the state of before')
     child.wait_for_line('[lidar]: tick', times=ticks + 1)
-    assert child.stop() == 0
-
-
-def test_the_state_is_shown(compose, peer, ask):
-    child = compose(SYSTEM, CODE)
-    child.wait_until_ready()
-    (system,) = ask('ps')['systems']
-    assert system['lifecycles'] == {'/lidar': 'unconfigured'}
-    peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
-    rows = [each for each in ask('top', '--once')['entities'] if each['kind'] == 'lifecycle']
-    assert [(each['node'], each['name']) for each in rows] == [('/lidar', 'inactive')]
     assert child.stop() == 0

@@ -4,9 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import GetState
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -36,6 +34,10 @@ def count(node):
 
 def hear(node, message, what='heard'):
     node.logger.info(f'{what} {message.data}')
+
+def create(node):
+    node.create_timer(0.02, tick)
+    node.create_subscription('std_msgs/msg/String', 'shouts', hear)
 
 def answer(node, request):
     return {'success': True}
@@ -82,18 +84,28 @@ def test_timers_and_publishers_rest_until_active(compose, peer, wait_for):
             on_configure: {behaviour: 'parts:say', with: {text: configured}}
             on_activate: {behaviour: 'parts:say', with: {text: activated}}
             on_deactivate: {behaviour: 'parts:say', with: {text: deactivated}}
-          other: {timers: {tick: {period: 0.02, behaviour: 'parts:tick'}}}
+          maker: {lifecycle: true, on_configure: parts:create}
+          other:
+            publishers: {shouts: {type: std_msgs/msg/String, external: true}}
+            timers: {tick: {period: 0.02, behaviour: 'parts:tick', publish: shouts}}
     """
     child = compose(text, CODE)
     child.wait_until_ready()
     heard = peer.listen(String, 'words')
     wait_for(lambda: peer.node.count_publishers('words'), 'the publisher')
-    peer.change_state('robot', CONFIGURE)
+    for node in ('robot', 'maker'):
+        peer.change_state(node, CONFIGURE)
     child.wait_for_line("publisher 'words' drops what is published: the node is configuring")
-    child.wait_for_line('[other]: tick', times=5)
+    child.wait_for_line('[other]: tick', times=len(child.matching('[other]: tick')) + 5)
     assert not child.matching('[robot]: tick')
-    peer.change_state('robot', ACTIVATE)
+    # What a transition creates rests, too.
+    assert not child.matching('[maker]: tick')
+    assert not child.matching('[maker]: heard')
+    for node in ('robot', 'maker'):
+        peer.change_state(node, ACTIVATE)
     child.wait_for_line('[robot]: tick', times=5)
+    child.wait_for_line('[maker]: tick', times=3)
+    child.wait_for_line('[maker]: heard tick', times=3)
     child.wait_for_line('[robot]: count 3')
     peer.change_state('robot', DEACTIVATE)
     wait_for(lambda: heard and heard[-1].data == 'deactivated', 'the last message')
@@ -169,32 +181,6 @@ def test_what_comes_meanwhile_is_dropped_or_kept(compose, peer, wait_for, local)
     assert child.stop() == 0
 
 
-def test_what_is_kept_as_told_is_no_problem(compose, peer, wait_for):
-    text = 'diagnostics: {period: 0.1}\n' + LISTENING.strip() % ('true', '')
-    child = compose(text, CODE + GO)
-    child.wait_until_ready()
-    arrays = peer.listen(DiagnosticArray, '/diagnostics', 100)
-
-    def told():
-        return [
-            (status.level, {each.key: each.value for each in status.values})
-            for array in list(arrays)
-            for status in array.status
-            if status.name == '/robot: subscription kept'
-        ]
-
-    peer.change_state('robot', CONFIGURE)
-    for number in range(1, 4):
-        peer.call(Trigger, 'go')
-        child.wait_for_line(f'has sent round {number}')
-    peer.change_state('robot', ACTIVATE)
-    wait_for(lambda: any(values['calls'] == '2' for _, values in told()), 'both calls')
-    assert {(level, values['queue overruns']) for level, values in told()} == {
-        (DiagnosticStatus.OK, '0')
-    }
-    assert child.stop() == 0
-
-
 def test_requests_are_refused_by_default(compose, peer):
     child = compose(LISTENING % ('true', ''), CODE + GO)
     child.wait_until_ready()
@@ -213,30 +199,9 @@ def test_requests_are_refused_by_default(compose, peer):
     assert child.stop() == 0
 
 
-def test_a_latched_message_is_kept(compose, peer):
-    text = """
-        version: 1
-        nodes:
-          robot:
-            lifecycle: {start: inactive}
-            subscriptions:
-              map:
-                type: std_msgs/msg/String
-                qos: {depth: 1, durability: transient_local}
-                behaviour: parts:hear
-                external: true
-    """
-    child = compose(text, CODE)
-    child.wait_until_ready()
-    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    peer.advertise(String, 'map', qos).publish(String(data='of the house'))
-    assert peer.call(GetState, 'robot/get_state').current_state.label == 'inactive'
-    assert not child.matching('heard')
-    peer.change_state('robot', ACTIVATE)
-    child.wait_for_line('heard of the house')
-
-
-def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
+def test_goals_are_rejected_those_in_flight_end_and_a_latched_message_is_kept(
+    compose, peer, wait_for
+):
     from action_msgs.msg import GoalStatus
     from rclpy.action import ActionClient
 
@@ -247,6 +212,12 @@ def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
           robot:
             lifecycle: {start: inactive}
             actions: {count: {type: test_msgs/action/Fibonacci, behaviour: 'parts:compute'}}
+            subscriptions:
+              map:
+                type: std_msgs/msg/String
+                qos: {depth: 1, durability: transient_local}
+                behaviour: parts:hear
+                external: true
             on_deactivate: parts:note
     """
     child = compose(text, CODE)
@@ -260,8 +231,12 @@ def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
         wait_for(sent.done, 'the answer')
         return sent.result()
 
+    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    peer.advertise(String, 'map', qos).publish(String(data='of the house'))
     assert not send().accepted
+    assert not child.matching('heard')
     peer.change_state('robot', ACTIVATE)
+    child.wait_for_line('heard of the house')
     goal = send()
     assert goal.accepted
     result = goal.get_result_async()
@@ -271,42 +246,4 @@ def test_goals_are_rejected_and_those_in_flight_end(compose, peer, wait_for):
     assert result.result().status == GoalStatus.STATUS_ABORTED
     assert child.matching('[robot]: noted')
     peer.run(client.destroy)
-    assert child.stop() == 0
-
-
-def test_what_a_transition_creates_rests_until_active(compose, peer):
-    code = """
-def create(node):
-    node.create_timer(0.02, tick)
-    node.create_subscription('std_msgs/msg/String', 'words', hear)
-
-def tick(node):
-    node.logger.info('tick')
-
-def hear(node, message):
-    node.logger.info(f'heard {message.data}')
-
-def other(node):
-    node.logger.info('other')
-    return 'x'
-"""
-    text = """
-        version: 1
-        nodes:
-          robot:
-            lifecycle: true
-            on_configure: parts:create
-          other:
-            publishers: {words: {type: std_msgs/msg/String, external: true}}
-            timers: {t: {period: 0.02, behaviour: 'parts:other', publish: words}}
-    """
-    child = compose(text, code)
-    child.wait_until_ready()
-    peer.change_state('robot', CONFIGURE)
-    child.wait_for_line('[other]: other', times=len(child.matching('[other]: other')) + 5)
-    assert not child.matching('[robot]: tick')
-    assert not child.matching('[robot]: heard')
-    peer.change_state('robot', ACTIVATE)
-    child.wait_for_line('[robot]: tick', times=3)
-    child.wait_for_line('[robot]: heard x', times=3)
     assert child.stop() == 0

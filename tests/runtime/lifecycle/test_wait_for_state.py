@@ -7,29 +7,23 @@ pytest.importorskip('rclpy')
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
 
-from tests.running import ROOT
-
 pytestmark = pytest.mark.ros
 
 CODE = """
 def tell(node):
     node.logger.info('starts')
 """
-PROGRAM = ROOT / 'tests/runtime/lifecycle/managed_program.py'
 
 
-@pytest.mark.parametrize('is_own', [True, False])
-def test_a_node_starts_when_another_one_is_active(compose, peer, is_own, start_program):
-    text = f"""
+def test_a_node_starts_when_another_one_is_active(compose, peer):
+    text = """
         version: 1
         nodes:
           late:
-            wait_for: {{node: lidar, state: active}}
+            wait_for: {node: lidar, state: active}
             on_start: parts:tell
-          {'lidar: {lifecycle: true}' if is_own else 'other: {on_start: parts:tell}'}
+          lidar: {lifecycle: true}
     """
-    if not is_own:
-        start_program(PROGRAM, 'lidar')
     child = compose(text, CODE)
     peer.change_state('lidar', Transition.TRANSITION_CONFIGURE)
     child.wait_for_line("[late]: Waiting for node '/lidar' to be active")

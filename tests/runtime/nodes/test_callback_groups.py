@@ -22,7 +22,7 @@ barrier = threading.Barrier(2)
 
 def meet(node):
     try:
-        barrier.wait(timeout={timeout})
+        barrier.wait(timeout=0.2)
     except threading.BrokenBarrierError:
         barrier.reset()
         node.logger.info('met nobody')
@@ -32,33 +32,12 @@ def meet(node):
 def alone(node):
     node.state.inside += 1
     time.sleep(0.03)
-    node.logger.info(f'inside: {{node.state.inside}}')
+    node.logger.info(f'inside: {node.state.inside}')
     node.state.inside -= 1
 
 async def alone_async(node):
     alone(node)
 """
-
-
-def test_one_node_runs_one_behaviour_at_a_time_by_default(compose):
-    text = """
-        version: 1
-        nodes:
-          strict:
-            state: {inside: 0}
-            publishers: {ticks: std_msgs/msg/Empty}
-            subscriptions: {ticks: {type: std_msgs/msg/Empty, behaviour: 'parts:heard'}}
-            timers:
-              first: {period: 0.01, behaviour: 'parts:alone'}
-              second: {period: 0.01, behaviour: 'parts:alone_async'}
-              third: {period: 0.01, publish: ticks, message: {}}
-    """
-    code = CODE.format(timeout=1) + 'def heard(node, message):\n    alone(node)\n'
-    child = compose(text, code)
-    child.wait_for_line('inside', times=30)
-
-    assert child.stop() == 0
-    assert set(child.matching('inside')) == {'[INFO] [strict]: inside: 1'}
 
 
 MEETING = """
@@ -76,10 +55,25 @@ nodes:
   itself:
     timers:
       one: {period: 0.02, behaviour: 'parts:meet_at', with: {key: itself}, group: reentrant}
+  strict:
+    state: {inside: 0}
+    publishers: {ticks: std_msgs/msg/Empty}
+    subscriptions: {ticks: {type: std_msgs/msg/Empty, behaviour: 'parts:heard'}}
+    timers:
+      first: {period: 0.05, behaviour: 'parts:alone'}
+      second: {period: 0.05, behaviour: 'parts:alone_async'}
+      third: {period: 0.05, publish: ticks, message: {}}
+  named:
+    timers:
+      one: {period: 0.01, behaviour: 'parts:meet', group: shared}
+      two: {period: 0.01, behaviour: 'parts:meet', group: shared}
   left: {timers: {one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: nodes}}}}
   right: {timers: {one: {period: 0.05, behaviour: 'parts:meet_at', with: {key: nodes}}}}
 """
 MEET_AT = """
+def heard(node, message):
+    alone(node)
+
 barriers = {key: threading.Barrier(2) for key in ('groups', 'reentrant', 'itself', 'nodes')}
 
 def meet_at(node, key):
@@ -88,28 +82,18 @@ def meet_at(node, key):
 """
 
 
-def test_behaviours_of_other_nodes_and_of_other_or_reentrant_groups_run_at_the_same_time(compose):
-    child = compose(MEETING, CODE.format(timeout=30) + MEET_AT)
+def test_only_behaviours_of_other_nodes_and_of_other_or_reentrant_groups_run_at_once(compose):
+    child = compose(MEETING, CODE + MEET_AT)
 
     for name in ('groups', 'reentrant', 'itself'):
         child.wait_for_line(f'[INFO] [{name}]: met', times=2)
     for name in ('left', 'right'):
         child.wait_for_line(f'[INFO] [{name}]: met')
-
-
-def test_behaviours_of_one_named_group_do_not_run_at_the_same_time(compose):
-    text = """
-        version: 1
-        nodes:
-          strict:
-            timers:
-              one: {period: 0.01, behaviour: 'parts:meet', group: shared}
-              two: {period: 0.01, behaviour: 'parts:meet', group: shared}
-    """
-    child = compose(text, CODE.format(timeout=0.2))
-    child.wait_for_line('met nobody', times=3)
-
-    assert not [line for line in child.lines if line.endswith(': met')]
+    child.wait_for_line('inside', times=20)
+    child.wait_for_line('[named]: met nobody', times=3)
+    # Not those of one group, which is that of the node by default.
+    assert set(child.matching('inside')) == {'[INFO] [strict]: inside: 1'}
+    assert set(child.matching('[named]')) == {'[INFO] [named]: met nobody'}
 
 
 def test_from_the_request_to_stop_on_no_behaviour_but_those_of_servers_begins(node):

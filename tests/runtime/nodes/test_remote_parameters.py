@@ -1,7 +1,5 @@
 """Parameters of other nodes, of this process and of others."""
 
-import signal
-
 import pytest
 
 pytest.importorskip('rclpy')
@@ -48,44 +46,16 @@ SERVER = """
 """
 
 
-def asking(behaviour, arguments, *, server=SERVER, namespace='/robot'):
-    """Return a system whose client does this once."""
-    return f"""
-        version: 1
-        nodes:
-          client:
-            namespace: {namespace}
-            timers: {{tick: {{period: 0.02, behaviour: 'parts:{behaviour}', with: {arguments}}}}}
-{server}"""
-
-
-def test_parameters_of_a_node_of_this_process_are_set_and_read(compose):
-    arguments = '{of: robot/server, values: {speed: 1, mode: fast, names: []}}'
-    child = compose(asking('change', arguments, namespace='/'), CODE)
-
-    assert child.wait_for_line('now: ').endswith(
-        "now: {'speed': 1.0, 'mode': 'fast', 'names': []}"
-    )
-    assert child.stop() == 0
-
-
-def test_parameters_of_an_external_node_are_set_and_read(compose, peer):
-    peer.node.declare_parameter('limit', 3)
-    arguments = '{of: /peer, values: {limit: 4}}'
-    child = compose(asking('change', arguments, server=''), CODE)
-
-    assert child.wait_for_line('now: ').endswith("now: {'limit': 4}")
-    assert peer.node.get_parameter('limit').value == 4
-    assert child.stop() == 0
-
-
-def test_what_cannot_be_asked_is_an_error_with_its_reason(compose, peer):
-    peer.node.declare_parameter('limit', 3)
+def test_parameters_of_nodes_here_and_elsewhere_are_set_and_read_or_refused(compose, peer):
+    for name in ('limit', 'fixed'):
+        peer.node.declare_parameter(name, 3)
     peer.node.add_on_set_parameters_callback(
-        lambda _changes: SetParametersResult(successful=False, reason='not now')
+        lambda changes: SetParametersResult(successful=changes[0].name != 'fixed', reason='no')
     )
     timers = {
-        'peer': ('change_and_tell', '{of: /peer, values: {limit: 4}}'),
+        'own': ('change', '{of: server, values: {speed: 1, mode: fast, names: []}}'),
+        'external': ('change', '{of: /peer, values: {limit: 4}}'),
+        'peer': ('change_and_tell', '{of: /peer, values: {fixed: 4}}'),
         'here': ('change_and_tell', '{of: server, values: {mode: fast, speed: 2.5}}'),
         'nobody': ('change_and_tell', '{of: nobody, values: {mode: fast}, timeout: 0.2}'),
         'unknown': ('get_and_tell', '{of: /peer, names: [lmit]}'),
@@ -104,10 +74,13 @@ def test_what_cannot_be_asked_is_an_error_with_its_reason(compose, peer):
 {SERVER}"""
     child = compose(text, CODE)
 
+    child.wait_for_line("now: {'speed': 1.0, 'mode': 'fast', 'names': []}")
+    child.wait_for_line("now: {'limit': 4}")
     assert child.wait_for_line("node '/peer' refused").endswith(
-        "ParametersRefusedError: node '/peer' refused 'limit': not now"
+        "ParametersRefusedError: node '/peer' refused 'fixed': no"
     )
-    assert peer.node.get_parameter('limit').value == 3
+    assert peer.node.get_parameter('limit').value == 4
+    assert peer.node.get_parameter('fixed').value == 3
     line = child.wait_for_line("ParametersRefusedError: node 'server' refused 'speed': ")
     assert "'mode'" not in line
     assert child.wait_for_line("node '/robot/nobody'").endswith(
@@ -121,8 +94,11 @@ def test_what_cannot_be_asked_is_an_error_with_its_reason(compose, peer):
 
 
 def test_a_signal_ends_a_behaviour_that_waits_for_a_node(compose):
-    child = compose(asking('wait_long', '{}'), CODE)
+    text = (
+        'version: 1\nnodes: {client: {timers: {t: {period: 0.02, behaviour: parts:wait_long}}}}\n'
+    )
+    child = compose(text, CODE)
     child.wait_for_line('asking')
 
-    assert child.stop(signal.SIGINT) == 0
+    assert child.stop() == 0
     assert 'rror' not in child.output

@@ -62,9 +62,9 @@ def tell_simulated(node):
     value = node.ros.get_parameter('use_sim_time').value
     node.logger.info(f'{node.name} simulates: {value}')
 
-def set_of_plain(node):
+def set_of_lean(node):
     try:
-        node.set_parameters('plain', {'speed': 2.0}, timeout=30)  # composer: ignore[unknown-parameter]
+        node.set_parameters('lean', {'speed': 2.0}, timeout=30)  # composer: ignore[unknown-parameter]
     except Exception as error:
         node.logger.info(f'{type(error).__name__}: {error}; {error.help}')
 
@@ -75,13 +75,6 @@ def ask_plain(node):
 def block(node):
     node.logger.info(f'{node.name} blocks')
     threading.Event().wait()
-
-def announce(node):
-    from rcl_interfaces.srv import GetParameters, ListParameters
-
-    # Two threads create services of these types, the first of which loads them.
-    loaded = [type(each)._TYPE_SUPPORT is not None for each in (GetParameters, ListParameters)]
-    node.logger.info('not a moment' if all(loaded) else 'types are not loaded')
 
 def live(node):
     node.state.ticks += 1
@@ -165,28 +158,7 @@ def test_services_that_were_asked_for_answer(graph, shared_peer, wait_for):
     assert described.type_description.type_description.type_name == name
 
 
-def test_a_node_without_events_of_its_own_tells_of_changes_that_a_behaviour_makes(
-    compose, peer, wait_for
-):
-    text = """
-        version: 1
-        nodes:
-          plain:
-            parameter_services: false
-            timers: {change: {period: 0.05, behaviour: 'parts:change'}}
-    """
-    heard = peer.listen(ParameterEvent, '/parameter_events')
-    compose(text, CODE).wait_until_ready()
-
-    def changes():
-        return [event for event in heard if event.changed_parameters]
-
-    event = wait_for(changes, 'a change')[0]
-    assert event.node == '/plain'
-    assert [parameter.name for parameter in event.changed_parameters] == ['mode']
-
-
-def test_a_peer_hears_on_rosout_what_behaviours_log_unless_the_file_turns_it_off(
+def test_a_peer_hears_what_behaviours_log_and_change_unless_the_file_turns_it_off(
     compose, peer, wait_for
 ):
     text = """
@@ -194,9 +166,13 @@ def test_a_peer_hears_on_rosout_what_behaviours_log_unless_the_file_turns_it_off
         defaults: {namespace: deep, rosout: false}
         nodes:
           silent: {timers: {tell: {period: 0.05, behaviour: 'parts:tell'}}}
+          changing:
+            parameter_services: false
+            timers: {change: {period: 0.05, behaviour: 'parts:change'}}
           heard: {rosout: true, timers: {tell: {period: 0.05, behaviour: 'parts:tell'}}}
     """
     logs = peer.listen(Log, '/rosout', 10)
+    events = peer.listen(ParameterEvent, '/parameter_events')
     child = compose(text, CODE)
     line = wait_for(lambda: [log for log in logs if log.name == 'deep.heard'], 'a line')[0]
     child.wait_for_line('[deep.silent]: I am silent')
@@ -204,30 +180,9 @@ def test_a_peer_hears_on_rosout_what_behaviours_log_unless_the_file_turns_it_off
     assert (line.msg, line.level, line.function) == ('I am heard', Log.INFO, 'tell')
     assert line.file.endswith('parts.py')
     assert {log.name for log in logs} == {'deep.heard'}
-
-
-def test_a_restarted_node_is_heard_on_rosout(compose, peer, wait_for):
-    text = """
-        version: 1
-        nodes:
-          phoenix:
-            on_error: restart
-            parameters: {mode: calm}
-            state: {ticks: 0}
-            publishers: {word: std_msgs/msg/String}
-            subscriptions: {word: {type: std_msgs/msg/String, behaviour: 'parts:ignore'}}
-            timers: {live: {period: 0.02, behaviour: 'parts:live'}}
-            on_start: parts:begin
-    """
-    logs = peer.listen(Log, '/rosout', LATCHED)
-    child = compose(text, CODE)
-    child.wait_for_line("node 'phoenix' was restarted")
-    child.wait_for_line('life 2, tick 3')
-
-    wait_for(lambda: [log for log in logs if log.msg.startswith('life 2')], 'the second life')
-    assert not child.matching('already registered')
-    assert not child.matching('still holds')
-    assert child.stop() == 0
+    event = wait_for(lambda: [each for each in events if each.changed_parameters], 'a change')[0]
+    assert event.node == '/deep/changing'
+    assert [parameter.name for parameter in event.changed_parameters] == ['mode']
 
 
 def test_the_command_line_has_the_last_word_on_what_the_file_sets(compose, peer):
@@ -260,39 +215,30 @@ def test_the_command_line_has_the_last_word_on_what_the_file_sets(compose, peer)
     peer.call(GetTypeDescription, '/three/get_type_description', type_name='x/msg/Y')
 
 
-def test_setting_a_parameter_of_a_node_without_services_is_an_error_that_says_so(compose):
-    text = """
-        version: 1
-        nodes:
-          asking:
-            namespace: deep
-            timers: {ask: {period: 0.02, behaviour: 'parts:set_of_plain'}}
-          plain: {namespace: deep, parameter_services: false}
-    """
-    child = compose(text, CODE)
-
-    assert child.wait_for_line('Error').endswith(
-        "ServiceNotAvailableError: node '/deep/plain' has no parameter services; "
-        "write 'parameter_services: true' where the file declares it"
-    )
-
-
 def test_a_start_that_waits_for_the_parameter_services_of_another_node_gets_them(compose):
     """They are created when the system is ready, which it is after this start."""
     text = """
         version: 1
         nodes:
           asking: {on_start: parts:ask_plain}
+          setting: {timers: {ask: {period: 0.02, behaviour: 'parts:set_of_lean'}}}
+          lean: {parameter_services: false}
           waiting: {wait_for: {service: plain/set_parameters}}
           plain: {}
     """
     child = compose(text, CODE)
     child.wait_until_ready()
     assert child.matching('plain simulates: False')
+    assert child.wait_for_line('Error').endswith(
+        "ServiceNotAvailableError: node '/lean' has no parameter services; "
+        "write 'parameter_services: true' where the file declares it"
+    )
     assert child.stop() == 0
 
 
-def test_parameters_are_served_beside_a_behaviour_that_blocks_and_after_a_restart(compose, peer):
+def test_parameters_and_rosout_are_served_beside_what_blocks_and_after_a_restart(
+    compose, peer, wait_for
+):
     text = """
         version: 1
         executor: {shutdown_timeout: 0.2}
@@ -300,22 +246,20 @@ def test_parameters_are_served_beside_a_behaviour_that_blocks_and_after_a_restar
           blocking: {timers: {block: {period: 0.02, behaviour: 'parts:block'}}}
           phoenix:
             on_error: restart
+            parameters: {mode: calm}
             state: {ticks: 0}
+            publishers: {word: std_msgs/msg/String}
+            subscriptions: {word: {type: std_msgs/msg/String, behaviour: 'parts:ignore'}}
             timers: {live: {period: 0.02, behaviour: 'parts:live'}}
             on_start: parts:begin
     """
+    logs = peer.listen(Log, '/rosout', LATCHED)
     child = compose(text, CODE)
     child.wait_for_line('blocking blocks')
     child.wait_for_line("node 'phoenix' was restarted")
     for node in ('blocking', 'phoenix'):
         response = peer.call(ListParameters, f'/{node}/list_parameters')
         assert 'use_sim_time' in response.result.names
-
-
-def test_a_stop_while_parameter_services_are_created_is_a_clean_one(compose):
-    nodes = ''.join(f'  node_{number}: {{}}\n' for number in range(60))
-    child = compose(f'version: 1\nnodes:\n  first: {{on_start: parts:announce}}\n{nodes}', CODE)
-    child.wait_for_line('not a moment')
-    # The system may be up before the signal of a stop in `on_start` arrives.
-    assert child.stop() in {0, 130}
-    assert not child.matching('ERROR')
+    wait_for(lambda: [log for log in logs if log.msg.startswith('life 2')], 'the second life')
+    assert not child.matching('already registered')
+    assert not child.matching('still holds')

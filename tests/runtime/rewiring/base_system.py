@@ -1,8 +1,7 @@
 """The files of a system with every kind of entity, from which random edits begin.
 
-A behaviour notes in its `own_state` how often it has run, and on what code. The nodes
-`witness` and `witness_afar`, which is in a worker, are never edited themselves: what they do must
-pass through all edits of others.
+The nodes `witness` and `witness_afar`, which is in a worker, are never edited themselves: what
+they do must pass through all edits of others.
 """
 
 PARTS = """
@@ -12,42 +11,31 @@ from pack import inner
 TAG = 0
 
 
-def note(node, name, **arguments):
-    node.own_state['ran'] = [name, TAG, helper.WORD, inner.TAG, arguments]
-    node.own_state['n'] = node.own_state.get('n', 0) + 1
-
-
 def tick(node, text='x'):
-    note(node, 'tick', text=text)
     return text
 
 
 def steps(node, text='a'):
     while True:
-        note(node, 'steps', text=text)
         yield text
 
 
 def few_steps(node):
     for number in range(3):
-        note(node, 'few_steps')
         yield str(number)
 
 
 async def tick_later(node):
-    note(node, 'tick_later')
     return 'later'
 
 
 async def steps_later(node):
     while True:
-        note(node, 'steps_later')
         yield 'b'
 
 
 class Ticking:
     def __call__(self, node):
-        note(node, 'ticking')
         return 'c'
 
 
@@ -59,11 +47,9 @@ class Kept:
         self.node = node
 
     def tick(self, node, text='k'):
-        note(self.node if node is None else node, 'tick', text=text)
         return text
 
     async def tick_later(self, node):
-        note(node, 'tick_later')
         return 'k'
 
 
@@ -80,39 +66,32 @@ def adjust(node, changes):
 
 
 def hear(node, message, prefix=''):
-    note(node, 'hear', prefix=prefix)
     return f'{prefix}{getattr(message, "data", "raw")}'
 
 
 async def hear_later(node, message):
-    note(node, 'hear_later')
     return getattr(message, 'data', 'raw')
 
 
 def answer(node, request, text='yes'):
-    note(node, 'answer', text=text)
     return {'success': True, 'message': text}
 
 
 async def answer_later(node, request):
-    note(node, 'answer_later')
     return {'success': True, 'message': 'later'}
 
 
 def count(node, goal, first=0):
     for number in range(goal.order):
         yield {'sequence': [number]}
-    note(node, 'count', first=first)
     return {'sequence': [first]}
 
 
 def count_at_once(node, goal):
-    note(node, 'count_at_once')
     return {'sequence': [2]}
 
 
 async def count_later(node, goal):
-    note(node, 'count_later')
     return {'sequence': [3]}
 
 
@@ -155,14 +134,10 @@ TAG = 0
 
 
 def tick(node, text='y'):
-    node.own_state['ran'] = ['tick', TAG, WORD, None, {'text': text}]
-    node.own_state['n'] = node.own_state.get('n', 0) + 1
     return text
 
 
 def hear(node, message, prefix='p'):
-    node.own_state['ran'] = ['hear', TAG, WORD, None, {'prefix': prefix}]
-    node.own_state['n'] = node.own_state.get('n', 0) + 1
     return None
 """
 

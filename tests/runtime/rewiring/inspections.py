@@ -11,7 +11,6 @@ from composer.runtime.rewiring.rewire import Rewiring
 from tests.runtime.rewiring.base_system import WITNESSES
 from tests.runtime.rewiring.descriptions import describe
 from tests.runtime.rewiring.memories import find_lost, remember
-from tests.runtime.rewiring.running import Runs
 
 # After steps of these a failure strikes.
 _STEPS = (
@@ -37,7 +36,6 @@ class Inspection:
     def __init__(self, system):
         self._system = system
         self._kept = {}
-        self._runs = None
         self._patches = ExitStack()
 
     def describe(self):
@@ -55,15 +53,6 @@ class Inspection:
     def find_lost(self, operations):
         """Return what is not as it was though no operation names it."""
         return [repr(each) for each in find_lost(self._kept, remember(self._system), operations)]
-
-    def begin_runs(self, touched):
-        """Return how to have each behaviour run that should."""
-        self._runs = Runs(self._system, touched)
-        return self._runs.questions()
-
-    def find_ran(self, told):
-        """Return the keys of the behaviours that have run since."""
-        return self._runs.take_ran(told)
 
     def set_live(self, seed, text):
         """Set a value of the state, and a parameter; return its node, name and value, if any."""

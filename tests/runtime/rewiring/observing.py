@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from contextlib import suppress
-from time import monotonic, sleep
 
 import rclpy
 from rclpy.action import ActionClient
@@ -88,32 +87,6 @@ class Observer:
         self.node.destroy_node()
         self._context.try_shutdown()
         self._context.destroy()
-
-
-def check_runs(processes, observer, plan, told):
-    """Wait until each behaviour has run that should; actions only if the plan names them."""
-    touched = {each.target for each in plan.operations}
-    pending = [(each, each.begin_runs(touched)) for each in processes]
-    deadline = monotonic() + DEADLINE_SEC
-    while any(questions for _, questions in pending):
-        for process, questions in pending:
-            for question in questions.values():
-                _ask(observer, *question)
-            for key in process.find_ran(told) if questions else ():
-                del questions[key]
-        left = [[*questions] for _, questions in pending]
-        assert monotonic() < deadline, f'{told}: does not run: {left}'
-        sleep(0.01)
-
-
-def _ask(observer, section, name, type_name):
-    """Let a behaviour have what it waits for."""
-    if section == 'subscriptions':
-        observer.publish(name, type_name)
-    elif section == 'services':
-        observer.wait(observer.begin_call(name, type_name))
-    elif section == 'actions':
-        observer.wait(observer.send_goal(name, type_name, order=1))
 
 
 def see_graph(node):

@@ -219,18 +219,10 @@ class Edited:
         """Return what a behaviour finds in the modules of the library."""
         return json.loads(self.call(Trigger, '/read').message)
 
-    def list_nodes(self):
-        """Return the names of the nodes on the graph."""
-        return self._peer.node.get_node_names()
-
     def see_clock(self):
         """Return the IDs of the subscriptions to `/clock`."""
         found = self._peer.node.get_subscriptions_info_by_topic('/clock')
         return [bytes(end.endpoint_gid) for end in found]
-
-    def count_publishers(self, topic):
-        """Return how many publishers a topic has."""
-        return len(self._peer.node.get_publishers_info_by_topic(topic))
 
     def get(self, name):
         """Return the value of a parameter of the clock."""
@@ -376,18 +368,6 @@ def test_clocks_and_parameter_files_stay_if_something_else_fails(edited):
     _, said = edited.edit({**failing, '  clock:': '  clock:\n    rosout: false'})
     assert said.startswith('not reloaded: ')
     assert (edited.get('size'), edited.get('use_sim_time')) == (7, True)
-
-
-def test_a_node_with_an_action_server_and_client_goes(edited):
-    both = """  ear:
-    actions: {run: {type: test_msgs/action/Fibonacci, behaviour: parts:run}}
-    action_clients: {run: {type: test_msgs/action/Fibonacci, external: true}}"""
-    run = {'FIRST = 0': 'FIRST = 0\n\n\ndef run(node, goal):\n    return {}\n'}
-    _, said = edited.edit({**run, '  ear:': both})
-    assert said.startswith('reloaded in '), said
-    wait_for(lambda: 'ear' in edited.list_nodes(), 'the node')
-    edited.edit({'  ear:': '  ear2:'})
-    wait_for(lambda: 'ear' not in edited.list_nodes(), 'the end of the node')
 
 
 @pytest.mark.parametrize(

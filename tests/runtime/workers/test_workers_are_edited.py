@@ -2,12 +2,12 @@
 
 import json
 import os
-import signal
 
 import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.cli.main import run
 from tests.running import is_there
 from tests.runtime.workers.observed import (
     CODE,
@@ -93,21 +93,41 @@ def test_who_calls_a_server_moves_with_it(compose):
 
     child = compose(text('left', 'right'), code, '--watch')
     environment = 'workers: {both: {environment: {SENSOR: front}}}\n'
-    edits = [('both', 'both'), ('both', 'both', environment)]
-    for times, each in enumerate([None, *edits], start=1):
-        if each is not None:
-            edit(compose, child, text(*each), code)
+    for times in (1, 2):
+        if times == 2:
+            edit(compose, child, text('both', 'both', environment), code)
         pid_of(child, 'client', times=times)
         done = len(child.matching('is answered'))
         child.wait_for_line('is answered', times=done + 2)
     assert child.stop() == 0
 
 
-def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose):
+def tell_of_workers(capsys, pids):
+    """Check what the commands say of the workers of a talker and of one who hears it."""
+    assert run(['ps', '--format', 'json']) == 0
+    (found,) = json.loads(capsys.readouterr()[0])['systems']
+    assert found['nodes'] == ['/talker', '/far']
+    assert found['workers'] == [
+        {'name': name, 'state': 'running', 'pid': pid, 'restarts': 0, 'nodes': [node_name]}
+        for name, pid, node_name in zip(('left', 'right'), pids, ('/talker', '/far'), strict=True)
+    ]
+    assert run(['top', '--once', '--format', 'json']) == 0
+    entities = json.loads(capsys.readouterr()[0])['entities']
+    assert {(each['node'], each['worker']) for each in entities} == {
+        ('/talker', 'left'),
+        ('/far', 'right'),
+    }
+
+
+def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose, capsys, monkeypatch):
     nodes = {'talker': node('left', *TALKS), 'far': node('right', *HEARS)}
     child = compose(system(nodes), CODE, '--watch')
     child.wait_until_ready()
     pids = [pid_of(child, name) for name in nodes]
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(compose.domain_id))
+    tell_of_workers(capsys, pids)
+    assert run(['restart', '/talker']) == 0
+    assert pid_of(child, 'talker', times=2) == pids[0]
 
     edit(compose, child, system(nodes), CODE.replace(' hears ', ' reads '))
     child.wait_for_line('far reads')
@@ -131,53 +151,4 @@ def test_new_code_runs_in_workers_and_a_bad_edit_changes_nothing(compose):
     child.wait_for_line('far reads', times=seen + 5)
     # For a moment, it may have run where it was to be.
     assert not [each for each in child.matching('far gets') if each.endswith(f'in {pids[1]}')]
-    assert child.stop() == 0
-
-
-def test_a_running_system_tells_of_its_workers(compose, capsys, monkeypatch):
-    from composer.cli.main import run
-
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(compose.domain_id))
-    child = compose(system({'talker': node('left', *TALKS), 'home': node('', *HEARS)}), CODE)
-    child.wait_until_ready()
-    assert run(['ps', '--format', 'json']) == 0
-    (found,) = json.loads(capsys.readouterr()[0])['systems']
-    assert found['nodes'] == ['/home', '/talker']
-    (worker,) = found['workers']
-    assert worker == {
-        'name': 'left',
-        'state': 'running',
-        'pid': pid_of(child, 'talker'),
-        'restarts': 0,
-        'nodes': ['/talker'],
-    }
-    assert run(['top', '--once', '--format', 'json']) == 0
-    entities = json.loads(capsys.readouterr()[0])['entities']
-    assert {(each['node'], each['worker']) for each in entities} == {
-        ('/talker', 'left'),
-        ('/home', ''),
-    }
-    assert run(['restart', '/talker']) == 0
-    assert pid_of(child, 'talker', times=2) == worker['pid']
-    assert child.stop() == 0
-
-
-def test_an_edit_takes_a_worker_that_waits_to_be_started_again(compose):
-    nodes = {'talker': node('left', *TALKS), 'far': node('right', *HEARS)}
-    slow = 'workers: {left: {restart: {delay: 3}, log_level: error}}\n'
-    child = compose(system(nodes, slow), CODE, '--watch')
-    child.wait_until_ready()
-    os.kill(pid_of(child, 'talker'), signal.SIGKILL)
-    child.wait_for_line('it is started again in')
-
-    # It comes up with the new code, and only as long as it has nodes.
-    edit(compose, child, system(nodes, slow), CODE.replace(' begins in ', ' comes up in '))
-    child.wait_for_line("worker 'left' was started again")
-    again = int(child.wait_for_line('talker comes up in').split()[-1])
-    os.kill(again, signal.SIGKILL)
-    child.wait_for_line('it is started again in', times=2)
-    edit(compose, child, system({'far': nodes['far']}), CODE)
-    edit(compose, child, system({'far': nodes['far'], 'talker': node('', *TALKS)}), CODE)
-    assert pid_of(child, 'talker', times=2) == child.pid
-    assert len(child.matching('was started again')) == 1
     assert child.stop() == 0
