@@ -234,12 +234,7 @@ _SETTINGS = (
 
 
 def write_nodes(module: str, classes: Mapping[str, NodeShape]) -> Iterator[str]:
-    """Yield the lines of a stub with nodes.
-
-    Args:
-        module: Its dotted name.
-        classes: The shape of each node, by the name of its class; equal shapes are one class.
-    """
+    """Yield the lines of a stub with nodes; those of equal shapes are one class."""
     imports = StubImports(module)
     first: dict[NodeShape, str] = {}
     lines: list[str] = []

@@ -59,11 +59,7 @@ def read_template(name: str) -> str:
 
 
 def stand_ins(qos_profiles: Iterable[str] = ()) -> dict[str, str]:
-    """Return the stubs of what behaviours use of Composer and rclpy, in place of the packages.
-
-    Args:
-        qos_profiles: The names of those that the system declares.
-    """
+    """Return the stubs of what behaviours use of Composer and rclpy, in place of the packages."""
     names = ''.join(f'{name!r}, ' for name in qos_profiles)
     composer = read_template('composer.pyi').replace('Literal[', f'Literal[{names}', 1)
     return {

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 from composer.checks.behaviours.behaviour_bodies import bound_at, readings_of
 from composer.checks.parameters import OF_EVERY_NODE
 from composer.diagnostics import diagnostic_at
-from composer.entity_kinds import (
-    BEHAVIOUR_KEYS,
-    ENTITY_KINDS,
-    KIND_OF_NOUN,
-    NODE_BEHAVIOURS,
-    USED_KINDS,
-)
+from composer.entity_kinds import KIND_OF_NOUN, USED_KINDS
 from composer.language.specs import NodeSpec
 from composer.spelling import find_nearest, is_short, is_typo, suggest
 
@@ -29,12 +23,7 @@ if TYPE_CHECKING:
 
 # Parameters that rclpy itself reads.
 _OF_ROS = 'qos_overrides.'
-# The places of behaviours and of `publish`.
-_USING_SECTIONS = {kind.section for kind in ENTITY_KINDS if kind.behaviours or kind.publishes}
-_USING_KEYS = {*BEHAVIOUR_KEYS, 'publish'}
 _KEYS_OF_NODES = {each.name for each in fields(NodeSpec)}
-_HOOKS = {each.key for each in NODE_BEHAVIOURS}
-_ENTITY_DEPTH = 2
 
 
 def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
@@ -46,9 +35,8 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
     whole = [
         (node, [found for _, found in uses[name]])
         for name, node in context.spec.nodes.items()
-        if not any(_may_hide_a_use(path) for path in lost.get(name, []))
-        # What is left out of a node may use the rest of it.
-        and partial.get(name, node) is node
+        # What is left out of a node, or has an error, may use the rest of it.
+        if name not in lost and partial.get(name, node) is node
     ]
     yield from _check_unused(context, whole)
 
@@ -221,11 +209,3 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
 
 def _is_of_ros(kind: str, name: str) -> bool:
     return kind == 'parameter' and (name in OF_EVERY_NODE or name.startswith(_OF_ROS))
-
-
-def _may_hide_a_use(path: DataPath) -> bool:
-    """Return whether a dropped entry of a node may have used something of the node."""
-    if not path or _is_unknown(path) or path[0] in _HOOKS:
-        return True
-    is_whole = len(path) <= _ENTITY_DEPTH
-    return path[0] in _USING_SECTIONS and (is_whole or path[-1] in _USING_KEYS)

@@ -73,10 +73,7 @@ def find_program() -> Path | None:
 def run_type_checker(
     program: Path, modules: Mapping[str, str], stubs: Mapping[str, str]
 ) -> tuple[str, list[TypeReport]]:
-    """Return the version of pyrefly, and what it reports of modules.
-
-    Args:
-        modules: The source of each, by its path; `stubs` likewise.
+    """Return the version of pyrefly, and what it reports of modules; texts are by their paths.
 
     Raises:
         TypeCheckerError: Pyrefly does not work.

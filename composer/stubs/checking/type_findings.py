@@ -115,10 +115,9 @@ class TypeFindings:
         self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
     ) -> Iterator[tuple[Diagnostic, range]]:
         """Yield the findings in a module, with the lines of the statements that they are in."""
-        own = {id(node) for node in ast.walk(copy.module.tree)}
-        for use in self.functions.values():
+        for (module, _), use in self.functions.items():
             # Type checkers take every text for possible where a parameter has choices.
-            nodes = ast.walk(use.definition) if id(use.definition) in own else ()
+            nodes = ast.walk(use.definition) if module == copy.module.name else ()
             for choice in filter(None, (self._unknown_choice(use, node) for node in nodes)):
                 finding = self._finding(copy, use, choice)
                 line = finding.span.line if finding.span else 0
@@ -399,11 +398,9 @@ class TypeFindings:
         names = {getattr(wire, key) for _, wire in use.bindings}
         full_name = names.pop() if len(names) == 1 else None
         match = _RETURNED.search(place.report.message)
-        if full_name is None:
+        if full_name is None or match is None or match[1] == 'None' or not place.values:
             return None
-        if match is None or match[1] == 'None':
-            return None
-        return self._payload(full_name, place.values[0], match[1]) if place.values else None
+        return self._payload(full_name, place.values[0], match[1])
 
     def _payload(self, full_name: str, value: ast.expr, given: str) -> _Problem | None:
         """Return what keeps a payload from becoming a message."""
