@@ -32,11 +32,7 @@ _TEXTS = ('string', 'wstring', 'byte')
 
 @record
 class ExpressionFinding:
-    """One error in an expression.
-
-    Attributes:
-        part: The text in it that has the error; empty for all of it.
-    """
+    """One error in an expression, and the part of its text that has it; empty for all of it."""
 
     rule: str
     message: str
@@ -46,12 +42,7 @@ class ExpressionFinding:
 
 @record
 class ExpressionValue:
-    """What is known of the value of an expression.
-
-    Attributes:
-        type: The type of the field that it is; `None` for a constant.
-        constant: The value that it always has.
-    """
+    """The type of the field that an expression is; `None` for a constant."""
 
     type: FieldType | None
     constant: object = None

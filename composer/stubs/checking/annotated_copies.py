@@ -53,12 +53,9 @@ class Received:
 
 @dataclass(slots=True)
 class FunctionUse:
-    """A function at the top level of a module or class, and what is known of its use.
+    """A function at the top level of a module or class, and what its parameters are given.
 
-    Attributes:
-        received: By parameter.
-        bindings: The places that it is bound to, with the types around it.
-        is_called: Whether the project itself calls or passes it.
+    It may be bound to several places, and be called or passed on by the project itself.
     """
 
     definition: FunctionNode
