@@ -95,13 +95,6 @@ def test_the_command_line_wins_over_files_and_files_over_keys_of_the_node(compos
     assert 'undeclared-parameter' in child.output
 
 
-def test_a_value_that_the_declaration_refuses_stops_the_start(compose, tmp_path):
-    write(tmp_path, site=SITE, others=OTHERS, own='/**: {ros__parameters: {speed: 9.0}}')
-    child = compose(SYSTEM)
-    assert child.wait() == 1
-    assert 'own.yaml:1:32: error[refused-parameter]' in child.output
-
-
 @pytest.fixture(scope='module')
 def context():
     context = rclpy.Context()

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from tests.runtime.rewiring.edit_values import LEFT_OUT, VALUES
+from tests.runtime.rewiring.edit_values import LEFT_OUT, LEFT_OUT_WHOLLY, VALUES
 from tests.runtime.rewiring.edits import Project
 from tests.runtime.rewiring.game import playing
 from tests.runtime.rewiring.schema_keys import read_schema_keys
@@ -30,7 +30,8 @@ def test_edits(tmp_path, domain_id, other_domain_id):
 
 
 def test_each_key_of_the_schema_is_edited(tmp_path):
-    assert read_schema_keys().keys() == VALUES.keys() | LEFT_OUT.keys()
+    keys = {key for key in read_schema_keys() if key.partition('.')[0] not in LEFT_OUT_WHOLLY}
+    assert keys == VALUES.keys() | LEFT_OUT.keys()
     project = Project(tmp_path, 1)
     project.keep()
     for number in range(4000):
