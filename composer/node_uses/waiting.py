@@ -6,7 +6,7 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.node_uses.message_uses import shown_value
-from composer.node_uses.names import Chain, Made
+from composer.node_uses.names import Chain, External, Made
 from composer.node_uses.reading import Awaited, Block
 from composer.python_source.syntax import is_none, own_nodes
 
@@ -30,6 +30,7 @@ LOCK, THREAD = 'threading.Lock', 'threading.Thread'
 # Methods after which a wait is as before.
 _HARMLESS = frozenset({'clear', 'task_done', 'acquire', 'release'})
 _ASKING = frozenset({'empty', 'full', 'is_set', 'qsize'})
+_CLOCKS = frozenset({'time.monotonic', 'time.perf_counter', 'time.time'})
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
 
 
@@ -118,7 +119,7 @@ def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
 
 
 def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
-    """Note a loop that only others end."""
+    """Note a loop that only others end, or only the clock."""
     outs = [each for each in own_nodes(loop) if isinstance(each, _WAYS_OUT)]
     test = loop.test
     if isinstance(test, ast.Constant):
@@ -129,9 +130,35 @@ def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
                 return
     elif outs:
         return
+    limit = _limit_of(run, test, scope)
+    if limit is not None:
+        note_sleep(run, limit, test, scope)
+        return
     match [*_names_in(run, test, scope)]:
         case [Awaited() as what]:
             _block(run, what, scope, test)
+
+
+def _limit_of(run: Run, test: ast.expr, scope: Scope) -> ast.expr | None:
+    """Return how long a loop goes on that only the clock ends."""
+    match test:
+        case ast.Compare(
+            left=ast.BinOp(left=clock, op=ast.Sub()),
+            ops=[ast.Lt() | ast.LtE()],
+            comparators=[limit],
+        ):
+            return limit if _is_clock(run, clock, scope) else None
+        case ast.Compare(left=clock, ops=[ast.Lt() | ast.LtE()], comparators=[ast.Name() as end]):
+            match _meant(run, end, scope):
+                case ast.BinOp(left=begin, op=ast.Add(), right=limit):
+                    is_clock = _is_clock(run, clock, scope) and _is_clock(run, begin, scope)
+                    return limit if is_clock else None
+    return None
+
+
+def _is_clock(run: Run, node: ast.expr, scope: Scope) -> bool:
+    function = run.names.value_of(node.func, scope) if isinstance(node, ast.Call) else None
+    return isinstance(function, External) and function.name in _CLOCKS
 
 
 def _names_in(run: Run, test: ast.expr, scope: Scope) -> set[Awaited | None]:

@@ -781,6 +781,14 @@ class Walk:
         self._call(value, scope, is_awaited=True)
 
     def _call(self, call: ast.Call, scope: Scope, *, is_awaited: bool = False) -> None:
+        match call.func:
+            case ast.Attribute(
+                value=ast.Subscript(value=publishers, slice=key), attr='publish'
+            ) if self._names.value_of(publishers, scope) == Chain(('node', 'publishers')):
+                # As `node.publish(key, …)`.
+                named = ast.Call(publishers, [key, *call.args], call.keywords)
+                self._call_node('publish', ast.copy_location(named, call), scope, is_awaited=False)
+                return
         func = self._names.value_of(call.func, scope)
         match func:
             case Chain():

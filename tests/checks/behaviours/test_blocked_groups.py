@@ -77,6 +77,7 @@ WRONG = {
     'with LOCK: add(node)': 'blocked-group',
     'with LOCK:\n    with LOCK: pass': 'blocked-group',
     'time.sleep(60)': 'long-sleep',
+    'end = time.monotonic() + 30\nwhile time.monotonic() < end: pass': 'long-sleep',
 }
 RIGHT = [
     'GO.wait(0.5)',
@@ -97,6 +98,7 @@ RIGHT = [
     'with LOCK: Thread(target=add, args=(node,)).start()',
     'if LOCK.acquire(blocking=False): LOCK.release()',
     'Thread(target=lambda: time.sleep(60)).start()',
+    'end = time.monotonic() + 30\nwhile time.monotonic() < end:\n    if GO.wait(1): return',
 ]
 
 
