@@ -101,7 +101,6 @@ nodes:
     timers: {{steer: {{period: 1.0, publish: /output/cmd_vel, message: {{}}}}}}
     subscriptions: {{/input/pose: {{type: {POSE}, behaviour: 'parts:hear'}}}}
 """
-FILES = {'chatter.yaml': CHATTER, 'turtle.yaml': TURTLE, 'mimic.yaml': MIMIC}
 
 # https://docs.ros.org/en/jazzy/How-To-Guides/Launch-file-different-formats.html
 FORMATS = """
@@ -224,41 +223,54 @@ def plain(tmp_path, start_program, other_domain_id):
     return run
 
 
-CASES = {
-    'formats': (
-        {'system.yaml': FORMATS},
-        ['chatter_ns:=/other/ns', 'background_r:=200'],
-        FORMATS_PROGRAMS,
-        ['/turtlesim1/sim', '/turtlesim2/sim'],
-    ),
-    'groups': ({'system.yaml': GROUPS, 'inner.yaml': INNER}, [], GROUPS_PROGRAMS, []),
-    'optional': (
-        {'system.yaml': OPTIONAL, 'values.yaml': VALUES},
-        ['namespace:=robot1'],
-        OPTIONAL_PROGRAMS,
-        ['/robot1/parameter_blackboard', '/robot1/arm/other'],
-    ),
+SYSTEM = """
+version: 1
+args: {chatter_ns: '', background_r: 0, namespace: ''}
+include:
+  formats:
+    file: formats.yaml
+    args: {chatter_ns: "{{ chatter_ns }}", background_r: "{{ background_r }}"}
+  groups: {file: groups.yaml}
+  optional: {file: optional.yaml, args: {namespace: "{{ namespace }}"}}
+nodes: {}
+"""
+FILES = {
+    'system.yaml': SYSTEM,
+    'formats.yaml': FORMATS,
+    'groups.yaml': GROUPS,
+    'optional.yaml': OPTIONAL,
+    'chatter.yaml': CHATTER,
+    'turtle.yaml': TURTLE,
+    'mimic.yaml': MIMIC,
+    'inner.yaml': INNER,
+    'values.yaml': VALUES,
+    'parts.py': BEHAVIOURS,
 }
+WORDS = ('chatter_ns:=/other/ns', 'background_r:=200', 'namespace:=robot1')
+PROGRAMS = FORMATS_PROGRAMS + GROUPS_PROGRAMS + OPTIONAL_PROGRAMS
+WITH_PARAMETERS = [
+    '/turtlesim1/sim',
+    '/turtlesim2/sim',
+    '/robot1/parameter_blackboard',
+    '/robot1/arm/other',
+]
 
 
-@pytest.mark.parametrize('case', CASES)
-def test_the_graph_is_that_of_the_launch_file(case, compose, plain, other_domain_id, wait_for):
-    files, words, programs, with_parameters = CASES[case]
-    for name, text in (FILES | files).items():
+def test_the_graph_is_that_of_the_launch_files(compose, plain, other_domain_id, wait_for):
+    for name, text in FILES.items():
         (compose.folder / name).write_text(text.lstrip())
-    (compose.folder / 'parts.py').write_text(BEHAVIOURS)
-    plain(programs)
-    child = compose.run(compose.folder / 'system.yaml', *words)
+    plain(PROGRAMS)
+    child = compose.run(compose.folder / 'system.yaml', *WORDS)
     child.wait_until_ready()
     wanted, real = Graph(other_domain_id), Graph(compose.domain_id)
     try:
-        count = sum(len(each['publishers'] + each['subscriptions']) for each in programs)
+        count = sum(len(each['publishers'] + each['subscriptions']) for each in PROGRAMS)
         for graph in (wanted, real):
-            wait_for(lambda graph=graph: len(graph.nodes()) >= len(programs), 'the nodes')
+            wait_for(lambda graph=graph: len(graph.nodes()) >= len(PROGRAMS), 'the nodes')
             wait_for(lambda graph=graph: len(graph.ends()) >= count, 'the ends of topics')
         assert real.nodes() == wanted.nodes()
         assert real.ends() == wanted.ends()
-        assert real.parameters(with_parameters) == wanted.parameters(with_parameters)
+        assert real.parameters(WITH_PARAMETERS) == wanted.parameters(WITH_PARAMETERS)
     finally:
         wanted.close()
         real.close()

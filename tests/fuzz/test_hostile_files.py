@@ -68,12 +68,7 @@ def test_hostile_files_end_in_findings(name, tmp_path):
 LONG = {
     'include': 'include: {a: {file: %s}}',
     'parameter file': 'nodes: {a: {parameter_files: [%s]}}',
-    'read at start': 'args: {a: {file: %s}}',
-    'command': 'nodes: {a: {parameters: {b: {command: [cat, %s]}}}}',
     'folder': 'processes: {a: {command: [python3, a.py], cwd: %s}}',
-    'script': 'processes: {a: {command: [python3, %s]}}',
-    'launch file': 'processes: {a: {launch: %s}}',
-    'of a package': 'processes: {a: {launch: "package://rclpy/%s"}}',
     'NoDL of a package': 'processes: {a: {command: [sh], interface: "package://rclpy/%s"}}',
 }
 
@@ -81,9 +76,9 @@ LONG = {
 @pytest.mark.parametrize('key', LONG)
 def test_names_too_long_for_files_are_findings(key, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    for command, name in (('check', 'x' * 300), ('graph', 'd/' * 2500)):
+    for name in ('x' * 300, 'd/' * 2500):
         Path('a.yaml').write_text(f'version: 1\n{LONG[key] % name}\n')
-        run([command, 'a.yaml'])
+        run(['check', 'a.yaml'])
         assert 'bug in Composer' not in capsys.readouterr().err
 
 

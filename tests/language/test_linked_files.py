@@ -1,5 +1,7 @@
 """Relative paths in a file that is reached through a symbolic link lie beside the file itself."""
 
+from pathlib import Path
+
 import pytest
 
 from composer import api
@@ -41,13 +43,7 @@ FILES = {
 # The file to load, the file that it includes, and the links.
 ARM_FILE = '../other/parts/arm.yaml'
 LAYOUTS = {
-    'no link': ('real/configs/robot.yaml', ARM_FILE, {}),
     'file': ('now.yaml', ARM_FILE, {'now.yaml': 'real/configs/robot.yaml'}),
-    'link to a link': (
-        'now.yaml',
-        ARM_FILE,
-        {'now.yaml': 'links/next.yaml', 'links/next.yaml': '../real/configs/robot.yaml'},
-    ),
     'included file': (
         'real/configs/robot.yaml',
         'arm.yaml',
@@ -75,15 +71,14 @@ def linked(request, tmp_path):
     return tmp_path / file
 
 
-@pytest.mark.parametrize('folder', ['.', '/'])
-def test_all_relative_paths_lie_beside_the_file(linked, tmp_path, monkeypatch, folder):
-    monkeypatch.chdir(tmp_path / folder)
+def test_all_relative_paths_lie_beside_the_file(linked, tmp_path, monkeypatch):
+    monkeypatch.chdir('/')
     assert api.check(linked) == []
     spec = api.load(linked).spec
     configs = tmp_path / 'real/configs'
     assert spec.processes['camera'].command == ('ls', str(configs))
-    assert (tmp_path / folder / spec.processes['camera'].cwd).samefile(configs / 'camera')
-    assert (tmp_path / folder / spec.interfaces['shapes']).samefile(tmp_path / 'real/shapes')
+    assert Path(spec.processes['camera'].cwd).samefile(configs / 'camera')
+    assert Path(spec.interfaces['shapes']).samefile(tmp_path / 'real/shapes')
     assert set(spec.nodes) == {'robot', 'arm', 'hand'}
 
 

@@ -76,31 +76,27 @@ def run(pytester, monkeypatch):
     return run
 
 
-def test_cases_are_tests_and_their_failures_are_our_reports(run):
-    result = run('-v', **{'car.scenario.yaml': SCENARIO})
-    result.assert_outcomes(passed=1, failed=1)
-    result.stdout.fnmatch_lines(
+def test_cases_are_tests_their_failures_our_reports_and_errors_in_files_fail_them_all(run):
+    files = {
+        'car.scenario.yaml': SCENARIO,
+        'typo.scenario.yaml': SCENARIO.replace('/scan', '/scann'),
+        'odd.scenario.yaml': 'version: 1\ncasses: {}\n',
+    }
+    result = run('-v', '--continue-on-collection-errors', **files)
+    result.assert_outcomes(passed=1, failed=3, errors=1)
+    told = ['tests/typo.scenario.yaml:7:*error[[]*', "*did you mean '/scan'?*"]
+    for lines in (
         [
             'tests/car.scenario.yaml::stops PASSED*',
             'tests/car.scenario.yaml::never drives FAILED*',
             '*tests/car.scenario.yaml:11:*: expected no message on /out where data > 0, got 1*',
             '*/out {data: 1.0}*',
             "seed 0; to run this case again: composer test 'tests/car.scenario.yaml::never drives'*",
-        ]
-    )
-    result.stdout.no_fnmatch_line('*Traceback*')
-
-
-def test_of_a_file_with_errors_all_cases_fail_and_of_one_that_cannot_be_read_the_collection(run):
-    broken = SCENARIO.replace('/scan', '/scann')
-    files = {'car.scenario.yaml': broken, 'odd.scenario.yaml': 'version: 1\ncasses: {}\n'}
-    result = run('--continue-on-collection-errors', **files)
-    result.assert_outcomes(errors=1, failed=2)
-    result.stdout.fnmatch_lines(
-        ['tests/odd.scenario.yaml:2:*error[[]*', "*did you mean 'cases'?*"]
-    )
-    told = ['tests/car.scenario.yaml:7:*error[[]*', "*did you mean '/scan'?*"]
-    result.stdout.fnmatch_lines([*told, *told])
+        ],
+        ['tests/odd.scenario.yaml:2:*error[[]*', "*did you mean 'cases'?*"],
+        [*told, *told],
+    ):
+        result.stdout.fnmatch_lines(lines)
     result.stdout.no_fnmatch_line('*Traceback*')
 
 
@@ -205,30 +201,22 @@ FAILING = """
 """
 
 
-def test_tests_in_python_drive_systems(run):
-    run(**{'test_car.py': DRIVING}).assert_outcomes(passed=11)
-
-
-def test_other_plugins_work_with_it(run):
-    words = ('-n', '1', '--timeout', '100', '-k', 'stops or patched or times')
-    files = {'test_car.py': DRIVING, 'car.scenario.yaml': SCENARIO}
-    run(*words, **files).assert_outcomes(passed=2)
-
-
-def test_a_failure_shows_what_the_system_did(run):
-    result = run(**{'test_car.py': FAILING})
-    result.assert_outcomes(passed=1, failed=1, errors=1)
-    result.stdout.fnmatch_lines(
+def test_tests_in_python_drive_systems_and_failures_show_what_those_did(run):
+    """Other plugins work with it."""
+    files = {'test_car.py': DRIVING, 'test_failing.py': FAILING}
+    result = run('-n', '1', '--timeout', '100', **files)
+    result.assert_outcomes(passed=12, failed=1, errors=1)
+    for lines in (
+        ['*a behaviour raised an error*', '*ValueError: negative'],
         [
-            '*a behaviour raised an error*',
-            '*ValueError: negative',
             '*assert 1.0 == 9.0*',
             '*composer: last events call*',
             '1.000000000 message /driver /out {data: 1.0}',
             '*composer: log call*',
             '1 s [[]info[]] [[]/driver[]]: drives at 1.0',
-        ]
-    )
+        ],
+    ):
+        result.stdout.fnmatch_lines(lines)
 
 
 def test_it_costs_nothing_where_it_is_not_used(run):

@@ -10,7 +10,6 @@ from composer.simulation.trace import render_event
 
 pytestmark = pytest.mark.ros
 
-SYSTEMS = 2
 CODE = """
 import random
 import threading
@@ -98,9 +97,8 @@ def _create_system(seed):
     return yaml.safe_dump({'nodes': {name: dict(node) for name, node in nodes.items()}})
 
 
-@pytest.mark.parametrize('seed', range(SYSTEMS))
-def test_random_systems_are_repeatable_and_keep_orders(simulate, seed):
-    text = _create_system(seed)
+def test_a_random_system_is_repeatable_and_keeps_orders(simulate):
+    text = _create_system(0)
     for shuffle in (None, 1):
         first, again = (_run(simulate, text, shuffle) for _ in range(2))
         assert [render_event(each) for each in first] == [render_event(each) for each in again]
