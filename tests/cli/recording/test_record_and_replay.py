@@ -1,9 +1,6 @@
 """`composer record` writes what is on the graph, and `composer replay` publishes the same again."""
 
-import os
 import signal
-import subprocess
-import sys
 from collections import Counter
 from contextlib import contextmanager
 
@@ -16,7 +13,6 @@ import itertools
 from composer.cli.main import run as run_command
 from composer.recordings.reading import read_recording
 from tests.recorded import filled, write_recording
-from tests.running import DEADLINE_SEC, ROOT
 
 pytestmark = pytest.mark.ros
 
@@ -37,28 +33,15 @@ def run(domain_id, tmp_path, monkeypatch, capsys):
 
 
 @pytest.fixture
-def recording(domain_id, tmp_path):
+def recording(compose):
     """Return a context manager: `composer record` runs in it; its lines are there afterwards."""
 
     @contextmanager
-    def recording(*words, number=signal.SIGINT, code=0):
-        process = subprocess.Popen(
-            [sys.executable, '-m', 'composer', 'record', *map(str, words)],
-            cwd=tmp_path,
-            env=os.environ | {'PYTHONPATH': str(ROOT), 'PYTHONUNBUFFERED': '1'},
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        with process:
-            try:
-                lines = [process.stderr.readline().rstrip()]
-                assert lines[0].startswith('recording to '), lines
-                yield lines
-                process.send_signal(number)
-                lines += process.communicate(timeout=DEADLINE_SEC)[1].splitlines()
-            finally:
-                process.kill()
-        assert process.returncode == code
+    def recording(*words, number=signal.SIGINT):
+        child = compose.start('record', *words)
+        child.wait_for_line('recording to ')
+        yield child.lines
+        assert child.stop(number) == 0
 
     return recording
 
@@ -214,23 +197,19 @@ def test_types_that_are_not_installed_are_built_of_the_file(
     assert (read[2].pair.a, read[2].pair.b, read[2].text.data) == (1, 2, 'text')
 
 
-def test_a_recording_of_a_script_ends_with_sigint(recording, tmp_path):
-    """SIGINT is ignored at the start of what a script runs in the background."""
+def test_the_default_is_a_new_folder_with_the_time_and_sigterm_ends_it(recording, tmp_path):
+    """SIGINT is ignored at the start of what a script runs in the background, and ends it too."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with recording('-o', 'bag') as lines:
+        with recording() as by_time, recording('-o', 'bag', number=signal.SIGTERM) as lines:
             pass
     finally:
         signal.signal(signal.SIGINT, before)
+    assert by_time[0].startswith("recording to 'rosbag2_")
     assert lines[0] == "recording to 'bag'; Ctrl-C ends it"
-    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
-
-
-def test_the_default_is_a_new_folder_with_the_time_and_sigterm_ends_it(recording, tmp_path):
-    with recording(number=signal.SIGTERM):
-        pass
-    (folder,) = tmp_path.glob('rosbag2_*')
-    assert [each.suffix for each in sorted(folder.iterdir())] == ['.yaml', '.mcap']
+    for folder in (tmp_path / 'bag', *tmp_path.glob('rosbag2_*')):
+        assert sorted(each.suffix for each in folder.iterdir()) == ['.mcap', '.yaml']
+    assert len([*tmp_path.glob('rosbag2_*')]) == 1
 
 
 def test_topics_that_come_and_go_and_latched_messages_of_before_are_recorded(

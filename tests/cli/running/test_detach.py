@@ -3,8 +3,6 @@
 import os
 import re
 import signal
-import subprocess
-import sys
 from contextlib import suppress
 
 import pytest
@@ -13,7 +11,6 @@ pytest.importorskip('rclpy')
 
 from composer.cli.main import run
 from tests.cli.test_streams import end_without_reader
-from tests.running import DEADLINE_SEC, ROOT, Child
 
 pytestmark = pytest.mark.ros
 
@@ -42,22 +39,11 @@ def detached(compose, monkeypatch, capfd):
     pids = []
 
     def start(*words):
-        command = [sys.executable, '-m', 'composer', 'up', '--detach', *words]
-        environment = os.environ | {
-            'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
-        }
-        done = subprocess.run(
-            command,
-            cwd=compose.folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=DEADLINE_SEC,
-            check=False,
-        )
-        found = re.search(r'^process (\d+), log (.*)\n\Z', done.stderr, re.MULTILINE)
+        child = compose.start('up', '--detach', *words)
+        code = child.wait()
+        found = re.search(r'^process (\d+), log (.*)\Z', child.output, re.MULTILINE)
         pids.extend([int(found[1])] if found else [])
-        return done.returncode, done.stderr
+        return code, child.output
 
     yield start
     for pid in pids:
@@ -74,7 +60,7 @@ def test_the_terminal_comes_back_when_all_is_up(compose, detached, capfd):
     text, _ = capfd.readouterr()
     assert 'printed hi' in text
     assert 'logged hi' in text
-    follower = Child(['logs', '-f', 'system'], compose.folder, compose.domain_id, compose.folder)
+    follower = compose.start('logs', '-f', 'system')
     follower.wait_for_line('logged hi')
     domain = {'ROS_DOMAIN_ID': str(compose.domain_id)}
     assert end_without_reader(['logs', '-f', 'system'], compose.folder, **domain) == 0
@@ -83,7 +69,6 @@ def test_the_terminal_comes_back_when_all_is_up(compose, detached, capfd):
     assert "error: a system 'system' runs already on this ROS graph" in output
     assert run(['down']) == 0
     assert follower.wait() == 0
-    follower.end()
     capfd.readouterr()
     # It has ended, and its log is still there.
     assert run(['logs', 'system']) == 0

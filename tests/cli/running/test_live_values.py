@@ -1,16 +1,11 @@
 """`composer echo`, `call`, `send-goal` and `set`, against one running system."""
 
-import os
-import signal
-import subprocess
-import sys
-
 import pytest
 
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run as run_command
-from tests.running import DEADLINE_SEC, wait_for
+from tests.running import wait_for
 
 pytestmark = pytest.mark.ros
 
@@ -124,16 +119,12 @@ def test_what_is_wrong_is_told_with_a_way_out(run, words, code, told):
         (['send-goal', 'count', '100000'], 'sequence: ', 1),
     ],
 )
-def test_an_interrupt_ends_it(domain, words, line, code):
-    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
-    environment = {**os.environ, 'ROS_DOMAIN_ID': domain}
-    command = [sys.executable, '-m', 'composer', *words]
-    with subprocess.Popen(command, env=environment, **pipes) as child:
-        assert any(line in each for each in child.stdout)
-        child.send_signal(signal.SIGINT)
-        _, err = child.communicate(timeout=DEADLINE_SEC)
-    assert child.returncode == code
-    assert err == ('canceling the goal\nthe goal was canceled\n' if code else '')
+def test_an_interrupt_ends_it(domain, shared_compose, words, line, code):
+    child = shared_compose.start(*words)
+    child.wait_for_line(line)
+    assert child.stop() == code
+    told = ['canceling the goal', 'the goal was canceled'] if code else []
+    assert child.matching('the goal') == told
 
 
 def test_the_shell_completes_names(run, monkeypatch):
