@@ -61,7 +61,6 @@ EXAMPLES = read_examples()
 RUN = (
     'Programs, respawn, shutdown',
     'Event handlers and timers',
-    'Composable nodes',
 )
 
 
@@ -90,11 +89,7 @@ def folder(tmp_path, monkeypatch, shared_cache):
         program.parent.mkdir(parents=True)
         program.write_text(PROGRAM)
         program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    # The stand-in of a container, and what it can load.
-    container = prefix / 'lib' / 'rclcpp_components' / EXECUTABLES['rclcpp_components']
-    program = str(Path(__file__).with_name('container_program.py'))
-    run = f"import runpy\nrunpy.run_path({program!r}, run_name='__main__')\n"
-    container.write_text(f'#!{sys.executable}\n{run}')
+    # What a container can load.
     (index / 'composition').touch()
     components = index.with_name('rclcpp_components')
     components.mkdir()

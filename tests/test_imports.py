@@ -1,6 +1,6 @@
 """The structure of the package: which room imports which, and what a folder holds."""
 
-import ast
+import re
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -89,18 +89,23 @@ def room_of(module):
     return parts[1] if len(parts) > 1 else '__init__'
 
 
+IMPORT = re.compile(
+    r'^ *(?:from (composer[\w.]*) import (\([^)]*\)|.*)|import (composer[\w.]*))', re.MULTILINE
+)
+
+
 @cache
 def imports_of(module):
     """Return the modules that one imports anywhere, those for type checkers included."""
     found = set()
-    for node in ast.walk(ast.parse(MODULES[module].read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            assert not node.level, f'{module} has a relative import'
-            inner = {f'{node.module}.{alias.name}' for alias in node.names}
-            found |= inner & MODULES.keys()
-            found |= {node.module} if inner - MODULES.keys() else set()
+    text = MODULES[module].read_text()
+    assert not re.search(r'^ *from \.', text, re.MULTILINE), f'{module} has a relative import'
+    for source, names, whole in IMPORT.findall(text):
+        words = re.findall(r'(\w+)(?: as \w+)?', names.partition('#')[0])
+        inner = {f'{source}.{name}' for name in words}
+        found |= inner & MODULES.keys()
+        found |= {source} if inner - MODULES.keys() else set()
+        found.add(whole)
     return found & MODULES.keys() - {module}
 
 

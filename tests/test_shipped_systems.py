@@ -20,7 +20,7 @@ from lifecycle_msgs.srv import GetState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image, LaserScan, Range
 from std_msgs.msg import Bool, Float64, String
 
@@ -68,7 +68,6 @@ def nodes_of(peer):
 
 
 LAYERS = {
-    'as it is': ([], 'robot', 'front rear', (3.0, 1.0), (13.0, 17.0)),
     'in the warehouse, with an argument': (
         ['configs/sites/warehouse.yaml', 'robot:=rover'],
         'rover',
@@ -104,31 +103,6 @@ def test_the_wheels_of_the_robot_follow_the_governed_command(
     publish_until(commands, driving(*command), lambda: all(heard.values()), 'all wheels')
 
     assert {name: messages[0].data for name, messages in heard.items()} == pytest.approx(expected)
-    assert child.stop() == 0
-
-
-def test_two_arms_have_the_same_goals_and_limits_of_their_own(up, peer, wait_for, publish_until):
-    heard = {side: peer.listen(Float64, f'/{side}/position') for side in ('left', 'right')}
-    child = up('two_arms')
-    wait_for(lambda: nodes_of(peer) == {'/teacher', '/left/joint', '/right/joint'}, 'the nodes')
-    goals = peer.advertise(Float64, 'goal')
-    publish_until(goals, Float64(data=1.8), lambda: all(heard.values()), 'both arms')
-
-    assert {side: messages[0].data for side, messages in heard.items()} == {
-        'left': 1.0,
-        'right': 1.8,
-    }
-    assert child.stop() == 0
-
-
-def test_the_camera_is_simulated_by_default(up, peer, wait_for):
-    heard = peer.listen(Image, 'preview')
-    child = up('camera')
-    wait_for(lambda: len(heard) > 1, 'two previews')
-
-    assert (heard[0].header.frame_id, list(heard[0].data)) == ('camera', [0, 255])
-    nodes = {'/simulated_camera', '/preview'}
-    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
     assert child.stop() == 0
 
 
@@ -185,20 +159,6 @@ def python3(monkeypatch):
     monkeypatch.setenv('PATH', str(Path(sys.executable).parent), prepend=os.pathsep)
 
 
-def test_the_hybrid_system_hears_the_program_and_ends_with_it(up, peer, wait_for, python3):
-    ranges = peer.listen(Range, '/front/range', qos_profile_sensor_data)
-    obstacles = peer.listen(Bool, 'obstacle')
-    child = up('hybrid')
-    wait_for(lambda: {each.data for each in obstacles} == {True, False}, 'near and far things')
-
-    wait_for(lambda: ranges, 'a measurement')
-    assert ranges[0].header.frame_id == 'range_sensor'
-    nodes = {'/front/range_sensor', '/obstacle_detector'}
-    wait_for(lambda: nodes_of(peer) == nodes, lambda: f'{nodes}, not {nodes_of(peer)}')
-    assert child.stop() == 0
-    wait_for(lambda: not nodes_of(peer), 'the end of the program')
-
-
 def test_the_managed_system_brings_the_scanner_up_and_waits_for_a_manager(
     up, peer, wait_for, python3
 ):
@@ -239,16 +199,6 @@ def test_the_cell_loads_components_and_brings_one_to_active(up, peer, wait_for):
 
     assert judged[0].data
     assert peer.call(GetState, '/cell_1/gripper/get_state').current_state.label == 'active'
-    assert child.stop() == 0
-
-
-def test_the_imported_sensors_start_one_after_the_other(up, peer, wait_for, python3):
-    heard = {
-        name: peer.listen(Range, f'/scout/{name}/range', qos_profile_sensor_data)
-        for name in ('front', 'rear')
-    }
-    child = up('sensors')
-    wait_for(lambda: all(heard.values()), 'measurements of both')
     assert child.stop() == 0
 
 

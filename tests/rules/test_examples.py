@@ -1,5 +1,6 @@
 """Each rule has a bad example that fires it alone, with what is said of it, and a good one."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from composer.rules.examples import load_example
 from composer.runtime.behaviours.import_check import ImportCheck
 from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
+from tests.rules.applied_helps import ELSEWHERE, FOR_PEOPLE, apply, read_help
 
 WITHOUT = {
     # Only a ROS that remaps no actions shows it.
@@ -46,7 +48,7 @@ EXAMPLES = [
 ]
 
 
-@pytest.mark.parametrize('rule', sorted(list_rule_names() - WITHOUT)[::12])
+@pytest.mark.parametrize('rule', sorted(list_rule_names() - WITHOUT)[::40])
 def test_without_a_version_nothing_but_findings_comes(rule, tmp_path, monkeypatch, capsys):
     """The whole file counts as left out then, whatever else is in it."""
     monkeypatch.chdir(RULES_FOLDER / rule)
@@ -57,30 +59,39 @@ def test_without_a_version_nothing_but_findings_comes(rule, tmp_path, monkeypatc
         assert 'bug in' not in capsys.readouterr().err
 
 
-def find(rule, kind, monkeypatch):
-    """Return what is found in an example, with paths as they are in its folder."""
-    monkeypatch.chdir(RULES_FOLDER / rule)
+def find(rule, kind):
+    """Return what is found in an example, whose files are in this folder."""
     if load_rule(rule).family == 'scenarios':
         return check_scenarios(load_scenarios(Path(f'{kind}.yaml')), InterfaceCatalogue())
-    # Modules of the examples are no part of this process.
-    monkeypatch.setattr(sys, 'dont_write_bytecode', True)
     further = {'import': ImportCheck()} if rule in ONLY_WHEN_IMPORTED else None
     ((_, system),) = load_combinations(Path(f'{kind}.yaml'))
     return check_system(system, InterfaceCatalogue(), further)
 
 
 @pytest.mark.parametrize('rule', EXAMPLES)
-def test_a_bad_example_fires_its_rule_alone_and_a_good_one_none(rule, monkeypatch):
-    findings = find(rule, 'bad', monkeypatch)
+def test_a_bad_example_fires_its_rule_alone_with_a_help_that_works_and_a_good_one_none(
+    rule, tmp_path, monkeypatch
+):
+    folder = tmp_path / 'example'
+    shutil.copytree(RULES_FOLDER / rule, folder)
+    monkeypatch.chdir(folder)
+    # Modules of the examples are no part of this process.
+    monkeypatch.setattr(sys, 'dont_write_bytecode', True)
+    findings = find(rule, 'bad')
     assert {(finding.rule, finding.severity) for finding in findings} == {
         (rule, load_rule(rule).severity)
     }
     said = '\n\n'.join(map(render_finding, findings)) + '\n'
-    assert (
-        said.replace(f'{RULES_FOLDER / rule}/', '')
-        == (RULES_FOLDER / rule / 'bad.txt').read_text()
-    )
-    assert [render_finding(finding) for finding in find(rule, 'good', monkeypatch)] == []
+    assert said.replace(f'{folder}/', '') == (folder / 'bad.txt').read_text()
+    assert [render_finding(finding) for finding in find(rule, 'good')] == []
+    edits = [(finding, read_help(finding)) for finding in findings if finding.help]
+    assert (rule in FOR_PEOPLE) == (None in [edit for _, edit in edits])
+    for finding, edit in edits:
+        if edit is not None and rule not in ELSEWHERE:
+            shutil.copytree(RULES_FOLDER / rule, folder, dirs_exist_ok=True)
+            apply(finding, *edit)
+            left = [each.message for each in find(rule, 'bad') if each.rule == rule]
+            assert len(left) < len(findings), (finding.help, left)
 
 
 def test_each_rule_has_an_example():
