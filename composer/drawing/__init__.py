@@ -33,8 +33,3 @@ def render_picture(picture: Picture, format_name: str) -> str:
         'svg': render_svg,
     }
     return renderers[format_name](picture)
-
-
-def format_of(suffix: str) -> str | None:
-    """Return the format for a suffix such as `.svg`, or `None`."""
-    return next((name for name, known in FORMATS.items() if suffix.lower() in known), None)

@@ -1,39 +1,4 @@
-"""A picture as one JSON document, for other programs.
-
-```
-{
-  "version": 1,                raised when a key is removed or changes its meaning
-  "name", "description",       of the system
-  "nodes": [                   nodes and external processes
-    {"id": "node:/robot/arm", "kind": "node" | "process", "name", "namespace", "description",
-     "host", "worker",                      where it runs; empty where the file does not say
-     "findings": [0], "file", "line"}],
-  "channels": [                topics, services, actions
-    {"id": "topic:/robot/scan", "kind": "topic" | "service" | "action", "name",
-     "types": ["sensor_msgs/msg/LaserScan"],
-     "external": ["providers" | "users"],   which ends are outside the system: publishers
-                                            and servers, or subscriptions and clients
-     "findings", "file", "line"}],
-  "edges": [                   publishers, subscriptions, servers and clients
-    {"id": "publisher:/robot/arm:scan", "role": its kind, as in "publisher" or
-     "service client"; "service server" and "action server", "name", "node": <id>, "channel": <id>,
-     "from": <id>, "to": <id>,              the way of messages, requests and goals
-     "type", "qos": {"depth": 5},           policies that differ from the default; durations in s
-     "delivery": "local" | "sent" | "both" | "",   whether messages, calls and goals are handed
-                                            over within the process; empty without another end
-     "delivery_reason": "durability: transient_local",   why they are sent; "other worker" and
-                                            "other host" for what crosses
-     "by_parameter": {"topic": "prefix"},   what follows which parameter of the node
-     "findings", "file", "line"}],
-  "waits": [{"node": <id>, "for": <id>, "file", "line"}],
-  "findings": [                those of `composer check`; above they are indices into this list
-    {"rule", "severity": "error" | "warning", "message", "help", "file", "line", "column"}]
-}
-```
-
-Everything is in the order of the files. `file` is relative to the working folder if it lies in
-it; `line` and `column` count from 1, and are null where a finding has none.
-"""
+"""A picture as one JSON document, for other programs; `docs/drawing.md` describes it."""
 
 from __future__ import annotations
 
@@ -54,7 +19,7 @@ def render_json(picture: Picture) -> str:
 
 
 def describe_picture(picture: Picture) -> dict[str, Any]:
-    """Return a picture as plain data, of the form that this module's docstring gives."""
+    """Return a picture as plain data, of the form that `docs/drawing.md` gives."""
 
     def describe(part: Box | Edge | Wait, names: str = '', **more: Any) -> dict[str, Any]:
         """Return some attributes of a part, and its place."""

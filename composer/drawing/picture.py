@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from itertools import count
 from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -12,7 +11,7 @@ from composer.checks.connections.wait_conditions import waiters
 from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
 from composer.drawing.delivery import deliveries_of, policies_of
-from composer.drawing.finding_places import FindingPlaces
+from composer.drawing.finding_places import place_findings
 from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.qos import (
     BUILTIN_PROFILES,
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
 
 NodeKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']
+Places: TypeAlias = 'Mapping[DataPath, tuple[int, ...]]'
 
 # Policies whose values are clear without their names.
 _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
@@ -195,7 +195,7 @@ class Picture:
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
     """Return the picture of a system, with the findings at the parts that they are about."""
-    places = FindingPlaces(context.system.positions, context.topology, findings)
+    places = place_findings(context.system.positions, context.topology, findings)
     nodes = tuple(_nodes(context, places))
     ids = {node.path: node.id for node in nodes}
     channels = tuple(_channels(context.topology, places))
@@ -221,10 +221,8 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
     if isinstance(value, str):
         if value not in shown:
             text = conceal(value)
-            if text != value and text in shown.values():
-                numbered = (f'{text} {number}' for number in count(2))
-                text = next(each for each in numbered if each not in shown.values())
-            shown[value] = text
+            is_taken = text != value and text in shown.values()
+            shown[value] = f'{text} {len(shown)}' if is_taken else text
         return shown[value]
     if isinstance(value, tuple):
         return tuple(_concealed(each, shown) for each in value)
@@ -236,7 +234,7 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
     return value
 
 
-def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
+def _nodes(context: CheckContext, places: Places) -> Iterator[Box]:
     taken: set[str] = set()
     for node in waiters(context.spec):
         kind: NodeKind = 'process' if isinstance(node, ProcessSpec) else 'node'
@@ -252,11 +250,11 @@ def _nodes(context: CheckContext, places: FindingPlaces) -> Iterator[Box]:
             if isinstance(node, ComponentSpec)
             else (node.host, getattr(node, 'worker', ''))
         )
-        found = places.of(node.path)
+        found = places.get(node.path, ())
         yield Box(id_, kind, node.name, namespace, place, node.path, found, node.description)
 
 
-def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
+def _channels(topology: Topology, places: Places) -> Iterator[Box]:
     for channel in topology.channels.values():
         ends = channel.ends
         sides: set[Side] = {
@@ -271,7 +269,7 @@ def _channels(topology: Topology, places: FindingPlaces) -> Iterator[Box]:
             commonpath(f'/{end.node.namespace.strip("/")}' for end in ends),
             _common_place([place_of(end) for end in ends]),
             ends[0].path,
-            places.of((channel.kind, channel.name)),
+            places.get((channel.kind, channel.name), ()),
             types=tuple(dict.fromkeys(end.entity.type for end in ends)),
             external=tuple(sorted(sides)),
         )
@@ -284,9 +282,7 @@ def _common_place(places: Sequence[Place]) -> Place:
     return hosts.pop(), workers.pop() if len(workers) == 1 else ''
 
 
-def _edges(
-    context: CheckContext, places: FindingPlaces, ids: Mapping[DataPath, str]
-) -> Iterator[Edge]:
+def _edges(context: CheckContext, places: Places, ids: Mapping[DataPath, str]) -> Iterator[Edge]:
     for channel in context.topology.channels.values():
         deliveries = dict(deliveries_of(channel, context.spec.qos))
         for end in channel.ends:
@@ -308,7 +304,7 @@ def _edges(
                 _differing_policies(end, context.spec.qos),
                 deliveries[end.path],
                 end.path,
-                places.of(end.path),
+                places.get(end.path, ()),
                 {key: value.parameter for key, value in followed.items()},
             )
 

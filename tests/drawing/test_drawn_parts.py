@@ -114,7 +114,7 @@ def test_lines_that_a_setting_or_another_file_adds_are_shown_too(draw, needs_gra
     first, *added = data['parts']['n1']['excerpts']
     assert first['file'] == 'robot.yaml'
     assert sorted((each['file'], each['first'], each['lines']) for each in added) == [
-        (f'--set {setting}', 1, [setting]),
+        ('--set nodes.ear.log_level', 1, [setting]),
         ('site.yaml', 14, ['nodes: {ear: {use_sim_time: true}}']),
     ]
 
@@ -168,3 +168,22 @@ def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, box
             if token[0] == 'e':
                 inside = [end in box['members'] for end in parts[token]['near']]
                 assert (token in box['near']) == (sum(inside) == 1)
+
+
+def test_variables_of_processes_are_in_no_lines(draw, needs_graphviz):
+    text = """
+        version: 1
+        processes:
+          one: {command: [sh], env: {TOKEN: secret}}
+          two:
+            env:
+              TOKEN: |
+                secret
+            command: [sh]
+    """
+    picture = draw(text, 'processes.two.env.MORE=secret')
+    data = as_json(Drawing(picture).fold(()))
+    one, two = (data['parts'][token]['excerpts'] for token in ('n0', 'n1'))
+    assert one[0]['lines'] == ['  one: {command: [sh], …']
+    assert two[0]['lines'] == ['  two:', '    …', '…', '…', '    command: [sh]']
+    assert 'secret' not in json.dumps(data)

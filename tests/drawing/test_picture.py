@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from composer.drawing import FORMATS, format_of, render_picture
+from composer.drawing import render_picture
 from composer.drawing.json_document import describe_picture
 
 TALKER = """
@@ -276,11 +276,3 @@ def test_what_a_setting_says_lies_in_no_file(draw):
 @pytest.mark.parametrize('format_name', ['mermaid', 'dot', 'json'])
 def test_the_same_file_gives_the_same_text(draw, format_name):
     assert render_picture(draw(TALKER), format_name) == render_picture(draw(TALKER), format_name)
-
-
-def test_the_ending_of_a_file_tells_the_form():
-    endings = ['.SVG', '.html', '.gv', '.dot', '.json', '.mmd', '.txt', '', '.pdf']
-    assert [format_of(ending) for ending in endings] == [
-        *('svg', None, 'dot', 'dot', 'json', 'mermaid', 'mermaid', 'mermaid', None)
-    ]
-    assert set(map(format_of, endings)) == {*FORMATS, None}

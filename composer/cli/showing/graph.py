@@ -11,7 +11,7 @@ from composer.application.launch_file import relocate
 from composer.application.output import show_findings, write_file
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
-from composer.drawing import FORMATS, format_of, render_picture
+from composer.drawing import FORMATS, render_picture
 from composer.drawing.picture import build_picture
 from composer.errors import ExitCode, UsageError
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -63,7 +63,7 @@ def graph(
 
 def _format_of(output: Path | None) -> str:
     suffix = output.suffix if output else ''
-    name = format_of(suffix)
+    name = next((name for name, known in FORMATS.items() if suffix.lower() in known), None)
     if name is None:
         message = f"no format has the suffix '{suffix}'"
         raise UsageError(message, help=f'choose one with --format: {", ".join(FORMATS)}')

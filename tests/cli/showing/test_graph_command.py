@@ -50,9 +50,14 @@ def test_a_missing_argument_is_a_matter_of_usage(robot, capsys):
 
 
 def test_the_ending_of_the_output_tells_the_form(robot, capsys):
-    assert run(['graph', 'robot.yaml', 'name:=arm', '--output', 'robot.dot']) == 0
+    assert run(['graph', 'robot.yaml', 'name:=arm', '--output', 'robot.DOT']) == 0
     assert capsys.readouterr().out == ''
-    assert (robot / 'robot.dot').read_text().startswith('digraph "robot" {\n')
+    assert (robot / 'robot.DOT').read_text().startswith('digraph "robot" {\n')
+
+
+def test_a_suffix_that_no_format_has_is_a_matter_of_usage(robot, capsys):
+    assert run(['graph', 'robot.yaml', 'name:=arm', '--output', 'robot.pdf']) == 2
+    assert "no format has the suffix '.pdf'" in capsys.readouterr().err
 
 
 def test_a_format_that_is_named_wins(robot):
