@@ -175,18 +175,30 @@ def port_of(system):
     return int(re.search(r'ws://127\.0\.0\.1:(\d+)', system.output)[1])
 
 
+@pytest.fixture(scope='module')
+def system(shared_compose):
+    """Run a system that clients may change."""
+    system = shared_compose(SYSTEM, CODE, '--foxglove', '0', '--allow-changes')
+    system.wait_until_ready()
+    yield system
+    assert system.stop() == 0
+    assert not system.matching('ERROR')
+
+
 @pytest.fixture
-def start(compose):
-    def start(*options):
-        system = compose(SYSTEM, CODE, '--foxglove', '0', *options)
-        system.wait_until_ready()
-        return system, port_of(system)
-
-    return start
+def port(system):
+    """Return the port at which the system is served."""
+    return port_of(system)
 
 
-def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(start, peer, capsys):
-    system, port = start()
+@pytest.fixture
+def domain_id(shared_compose, system, monkeypatch):
+    """Return the domain of the system, which what tests run beside it is in, too."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(shared_compose.domain_id))
+    return shared_compose.domain_id
+
+
+def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(port, peer, capsys):
     sender = peer.run(peer.node.create_publisher, String, '/outside', 10)
     with connected(port) as one, connected(port) as two:
         one.subscribe('/count', 1)
@@ -223,8 +235,6 @@ def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(start, peer, c
         assert 'int64 data' in schema['schema']
         one.send('unsubscribe', subscriptionIds=[4])
         wait_for(lambda: not sender.get_subscription_count(), 'the end of the subscription')
-    assert system.stop() == 0
-    assert not system.matching('ERROR')
 
 
 def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog):
@@ -246,8 +256,72 @@ def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog)
     assert warning.startswith("a message of '/time' is left out: ")
 
 
-def test_clients_change_the_system_where_they_may(start):
-    system, port = start('--allow-changes')
+def test_who_does_not_read_holds_nobody_up_and_is_disconnected(port):
+    with ExitStack() as stack:
+        # It takes nothing more from the kernel than fits its queue, and only its pings find out.
+        pings = {'ping_interval': 0.2, 'ping_timeout': None}
+        mute = stack.enter_context(connected(port, max_queue=1, **pings))
+        mute.subscribe('/count', 1)
+        mute.subscribe('/big', 2)
+        reader = stack.enter_context(connected(port))
+        reader.subscribe('/count', 1)
+        for _ in range(3):
+            with ExitStack() as short:
+                for one in [short.enter_context(connected(port)) for _ in range(20)]:
+                    one.subscribe('/count', 1)
+        numbers = [message.data for message in reader.messages(1, Int64, count=100)]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
+        assert is_connected(reader.socket.socket)
+
+
+def test_a_system_is_shown_from_beside_it_where_clients_change_and_keep_nothing(
+    compose, port, node, domain_id, capsys
+):
+    assert run(['foxglove', 'nobody', '--port', '0']) == 1
+    beside = compose.start('foxglove', '--port', '0')
+    beside.wait_for_line('ws://')
+    with closing(Peer(domain_id)), connected(port_of(beside)) as one:
+        one.subscribe('/count', 1)
+        assert len(one.messages(1, Int64, count=10)) >= 10
+        one.send('setParameters', parameters=[{'name': '/talker.mode', 'value': 'fast'}], id='x')
+        status = one.wait_for_op('status')
+        assert status['message'] == 'parameters are set only with --allow-changes'
+        assert not one.services
+        # What is not there costs no other parameter.
+        names = '/talker.mode', '/a b.c', '/peer.use_sim_time'
+        expected = {'/talker.mode': 'slow', '/peer.use_sim_time': False}
+        wait_for(lambda: one.parameters(*names) == expected, 'the parameters')
+
+    def services():
+        return [name for name, _ in node.get_service_names_and_types() if '/peer/' in name]
+
+    # A client of it would keep its services on the graph.
+    wait_for(lambda: not services(), 'the end of the node')
+    assert beside.stop() == 0
+    capsys.readouterr()
+    path = compose.write('version: 1\nnodes: {alone: {}}\n', '', 'second')
+    other = compose.run(path.name, '--foxglove', str(port))
+    assert other.wait() == 1
+    assert f'error: Foxglove cannot be served at 127.0.0.1:{port}' in other.output
+    assert run(['up', str(path), '--allow-changes']) == 2
+    assert 'are for --foxglove' in capsys.readouterr().err
+
+
+def test_who_looks_at_the_graph_and_leaves_holds_nobody_up(port):
+    for number in range(52):
+        with connected(port) as one:
+            one.send('subscribeConnectionGraph')
+            one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
+            one.socket.recv(timeout=PATIENCE_SEC)
+            # It leaves a little sooner or later: about when the graph is sent.
+            time.sleep(number % 13 / 2000)
+    with connected(port) as one:
+        one.subscribe('/count', 1)
+        assert one.messages(1, Int64, count=5)
+
+
+def test_clients_change_the_system_where_they_may(system, port):
     with connected(port) as one:
         names = ('/talker.speed', '/talker.gains', '/talker.mode')
         assert one.parameters(*names) == dict(zip(names, (1.5, [1.0, 2.0], 'slow'), strict=True))
@@ -289,78 +363,3 @@ def test_clients_change_the_system_where_they_may(start):
         assert heard['/count'] == ['/hearer']
         assert served['/switch'] == ['/talker']
         assert published['/far'] == ['/far']
-
-
-def test_clients_change_nothing_otherwise_and_keep_nothing(
-    start, compose, node, domain_id, capsys
-):
-    _, port = start()
-    with closing(Peer(domain_id)), connected(port) as one:
-        one.send('setParameters', parameters=[{'name': '/talker.mode', 'value': 'fast'}], id='x')
-        status = one.wait_for_op('status')
-        assert status['message'] == 'parameters are set only with --allow-changes'
-        info = one.seen or [one.wait_for_op('serverInfo')]
-        assert not one.services, info
-        # What is not there costs no other parameter.
-        names = '/talker.mode', '/a b.c', '/peer.use_sim_time'
-        expected = {'/talker.mode': 'slow', '/peer.use_sim_time': False}
-        wait_for(lambda: one.parameters(*names) == expected, 'the parameters')
-
-    def services():
-        return [name for name, _ in node.get_service_names_and_types() if '/peer/' in name]
-
-    # A client of it would keep its services on the graph.
-    wait_for(lambda: not services(), 'the end of the node')
-    path = compose.write('version: 1\nnodes: {alone: {}}\n', '', 'second')
-    other = compose.run(path.name, '--foxglove', str(port))
-    assert other.wait() == 1
-    assert f'error: Foxglove cannot be served at 127.0.0.1:{port}' in other.output
-    assert run(['up', str(compose.folder / 'system.yaml'), '--allow-changes']) == 2
-    assert 'are for --foxglove' in capsys.readouterr().err
-
-
-def test_who_does_not_read_holds_nobody_up_and_is_disconnected(start):
-    system, port = start()
-    with ExitStack() as stack:
-        # It takes nothing more from the kernel than fits its queue.
-        mute = stack.enter_context(connected(port, max_queue=1))
-        mute.subscribe('/count', 1)
-        mute.subscribe('/big', 2)
-        reader = stack.enter_context(connected(port))
-        reader.subscribe('/count', 1)
-        for _ in range(3):
-            with ExitStack() as short:
-                for one in [short.enter_context(connected(port)) for _ in range(20)]:
-                    one.subscribe('/count', 1)
-        numbers = [message.data for message in reader.messages(1, Int64, count=100)]
-        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-        wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
-        assert is_connected(reader.socket.socket)
-    assert system.stop() == 0
-    assert not system.matching('ERROR')
-
-
-def test_a_system_that_runs_is_shown_from_beside_it(compose, capsys):
-    system = compose(SYSTEM, CODE)
-    system.wait_until_ready()
-    assert run(['foxglove', 'nobody', '--port', '0']) == 1
-    capsys.readouterr()
-    beside = compose.start('foxglove', '--port', '0')
-    beside.wait_for_line('ws://')
-    with connected(port_of(beside)) as one:
-        one.subscribe('/count', 1)
-        assert len(one.messages(1, Int64, count=10)) >= 10
-        assert one.parameters('/talker.mode') == {'/talker.mode': 'slow'}
-    assert beside.stop() == 0
-
-
-def test_who_looks_at_the_graph_and_leaves_holds_nobody_up(start):
-    system, port = start()
-    for number in range(104):
-        with connected(port) as one:
-            one.send('subscribeConnectionGraph')
-            one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
-            one.socket.recv(timeout=PATIENCE_SEC)
-            # It leaves a little sooner or later: about when the graph is sent.
-            time.sleep(number % 13 / 2000)
-    assert system.stop() == 0

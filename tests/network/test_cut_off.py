@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.network.test_discovery_kinds import CODE, SYSTEM
+from tests.network.test_discovery_kinds import CODE, OTHERS, SYSTEM
 from tests.network_namespaces import needs_namespaces
 
 # With these, Fast DDS takes a participant for gone after 4 s instead of 20.
@@ -20,9 +20,8 @@ SHORT_LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 pytestmark = [pytest.mark.ros, needs_namespaces]
 
 
-def check_return(hosts, how, **environment):
+def check_return(hosts, how, base, jetson):
     """Cut a host off until the other says that it is gone; check that all is as it was then."""
-    base, jetson = hosts.up('base', **environment), hosts.up('jetson', **environment)
     base.wait_for('saw', times=3)
     getattr(hosts['jetson'], how[0])()
     base.wait_for("host 'jetson' is gone: '/image' has no publisher")
@@ -35,12 +34,18 @@ def check_return(hosts, how, **environment):
         assert part.stop() == 0
 
 
-def test_a_host_that_was_gone_is_found_again(create_hosts, tmp_path):
+def test_a_part_waits_for_a_network_and_is_found_again_when_it_was_gone(create_hosts, tmp_path):
     hosts = create_hosts('base', 'jetson')
     hosts.write(SYSTEM, CODE, discovery='peers')
     profiles = tmp_path / 'short_lease.xml'
     profiles.write_text(SHORT_LEASE)
-    check_return(hosts, ('cut', 'mend'), FASTRTPS_DEFAULT_PROFILES_FILE=str(profiles))
+    environment = {**OTHERS, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(profiles)}
+    hosts['jetson'].take_down()
+    base, jetson = hosts.up('base', **environment), hosts.up('jetson', **environment)
+    jetson.wait_for('network: no interface is up; the start waits for one')
+    assert not jetson.count(' ready in ')
+    hosts['jetson'].bring_up()
+    check_return(hosts, ('cut', 'mend'), base, jetson)
 
 
 @pytest.mark.long
@@ -55,17 +60,4 @@ def test_a_host_that_was_gone_is_found_again(create_hosts, tmp_path):
 def test_a_host_is_found_again_with_the_usual_leases(create_hosts, network, how):
     hosts = create_hosts('base', 'jetson')
     hosts.write(SYSTEM, CODE, **network)
-    check_return(hosts, how)
-
-
-def test_a_part_that_starts_without_a_network_waits_for_it(create_hosts):
-    hosts = create_hosts('base', 'jetson')
-    hosts.write(SYSTEM, CODE, discovery='peers')
-    hosts['jetson'].take_down()
-    base, jetson = hosts.up('base'), hosts.up('jetson')
-    jetson.wait_for('network: no interface is up; the start waits for one')
-    assert not jetson.count(' ready in ')
-    hosts['jetson'].bring_up()
-    base.wait_for('saw', times=3)
-    for part in (base, jetson):
-        assert part.stop() == 0
+    check_return(hosts, how, hosts.up('base'), hosts.up('jetson'))

@@ -43,10 +43,9 @@ pytestmark = [pytest.mark.ros, needs_namespaces]
     ('network', 'forwards_multicast'),
     [
         ({'discovery': 'multicast', 'domain_id': 141}, True),
-        ({'discovery': 'peers'}, False),
         ({'discovery': 'discovery_server', 'server': 'base'}, False),
     ],
-    ids=['multicast', 'peers', 'discovery_server'],
+    ids=['multicast', 'discovery_server'],
 )
 def test_a_node_waits_for_one_on_another_host_and_hears_it(
     create_hosts, network, forwards_multicast

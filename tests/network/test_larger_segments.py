@@ -49,7 +49,6 @@ CAMERA_NODES = """
     subscriptions:
       image: {type: std_msgs/msg/String, topic: image, qos: sensor_data, behaviour: parts:see}
 """
-CAMERA = f'version: 1\nnodes:{CAMERA_NODES}'
 EYE = """
 version: 1
 nodes:
@@ -130,15 +129,26 @@ def test_the_room_that_is_checked_is_what_the_profile_takes():
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('are_added', [False, True], ids=['at the start', 'by an edit'])
-def test_large_messages_of_best_effort_cross_between_workers(compose, are_added):
-    child = compose(EYE if are_added else CAMERA, CODE, '--watch')
+def test_large_messages_of_best_effort_cross_between_workers_that_an_edit_adds(compose):
+    child = compose(EYE, CODE, '--watch')
     child.wait_until_ready()
-    if are_added:
-        compose.write(f'{EYE}{CAMERA_NODES}{HEARS_EYE}', CODE)
-        child.wait_for_line('network: the process of the system has little shared memory')
+    compose.write(f'{EYE}{CAMERA_NODES}{HEARS_EYE}', CODE)
+    child.wait_for_line('network: the process of the system has little shared memory')
     line = child.wait_for_line('detector has')
     assert child.stop() == 0
     # The first that arrives, and 19 more were sent.
     arrived = int(line.split()[2].rstrip(','))
     assert arrived >= 17
+
+
+@pytest.mark.ros
+def test_the_workers_of_a_start_get_the_profile(compose):
+    code = """
+        import os
+
+        def tell(node):
+            node.logger.info(os.environ['FASTDDS_DEFAULT_PROFILES_FILE'])
+    """
+    child = compose('version: 1\nnodes: {n: {worker: w, on_start: parts:tell}}\n', code)
+    assert child.wait_for_line('[n]: ').endswith(f': {PROFILE}')
+    assert child.stop() == 0
