@@ -1,13 +1,15 @@
-"""Plain rclpy servers and clients of the shipped systems, one a process: `external_peers.py ROLE`.
+"""Plain rclpy servers and clients of the shipped systems: `external_peers.py serve` or `ask CALLS`.
 
-A server says `ready` and serves until its standard input closes; a client prints its result as
-JSON and ends. Both have their types from packages that this process provides for itself.
+A server says `ready` and serves until its standard input closes; a client calls the functions of a
+JSON list with their arguments, prints their results as JSON and ends. Both have their types from
+packages that this process provides for itself.
 """
 
 import json
 import sys
 import threading
 import time
+from itertools import count
 from pathlib import Path
 
 import rclpy
@@ -56,52 +58,48 @@ def meet_action_server(name):
     call(CancelGoal, f'{name}/_action/cancel_goal', goal_info=nobody)
 
 
+def add(request, response):
+    response.sum = request.a + request.b
+    return response
+
+
+def calculate(request, response):
+    if node.get_parameter('operation').value == 'subtract':
+        request.b = -request.b
+    return add(request, response)
+
+
+def compute(goal):
+    sequence = [0, 1]
+    for _ in range(1, goal.request.order):
+        sequence.append(sequence[-1] + sequence[-2])
+        goal.publish_feedback(Fibonacci.Feedback(partial_sequence=sequence))
+    goal.succeed()
+    return Fibonacci.Result(sequence=sequence)
+
+
 def serve():
+    """Serve sums, and sequences to the first who asks."""
+    goals = count()
+
+    def decide(_goal):
+        # ROS drops what goes to an end that is not found yet; a client's last one is this.
+        while not node.count_subscribers('fibonacci/_action/status'):
+            time.sleep(0.01)
+        return GoalResponse.REJECT if next(goals) else GoalResponse.ACCEPT
+
+    node.declare_parameter('operation', 'add')
+    node.create_service(AddTwoInts, 'add_two_ints', add)
+    node.create_service(AddTwoInts, 'calculate', calculate)
+    ActionServer(node, Fibonacci, 'fibonacci', compute, goal_callback=decide)
     sys.stdout.write('ready\n')
     sys.stdout.flush()
     threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
     sys.stdin.read()
 
 
-def serve_sums(service):
-    def answer(request, response):
-        response.sum = request.a + request.b
-        if node.has_parameter('operation') and (
-            node.get_parameter('operation').value == 'subtract'
-        ):
-            response.sum = request.a - request.b
-        return response
-
-    node.create_service(AddTwoInts, service, answer)
-    serve()
-
-
-def serve_calculator():
-    node.declare_parameter('operation', 'add')
-    serve_sums('calculate')
-
-
-def serve_fibonacci(answer='accept'):
-    def compute(goal):
-        sequence = [0, 1]
-        for _ in range(1, goal.request.order):
-            sequence.append(sequence[-1] + sequence[-2])
-            goal.publish_feedback(Fibonacci.Feedback(partial_sequence=sequence))
-        goal.succeed()
-        return Fibonacci.Result(sequence=sequence)
-
-    def decide(_goal):
-        # ROS drops what goes to an end that is not found yet; a client's last one is this.
-        while not node.count_subscribers('fibonacci/_action/status'):
-            time.sleep(0.01)
-        return GoalResponse.ACCEPT if answer == 'accept' else GoalResponse.REJECT
-
-    ActionServer(node, Fibonacci, 'fibonacci', compute, goal_callback=decide)
-    serve()
-
-
 def ask_for_sum(service, a, b):
-    return call(AddTwoInts, service, a=int(a), b=int(b)).sum
+    return call(AddTwoInts, service, a=a, b=b).sum
 
 
 def set_operation(operation):
@@ -110,7 +108,7 @@ def set_operation(operation):
     return response.results[0].successful, response.results[0].reason
 
 
-def send_goal(order, cancel='no'):
+def send_goal(order, *options):
     """Send a goal, cancel it at its first feedback if so wanted."""
     client = ActionClient(node, Fibonacci, 'fibonacci')
     if not client.wait_for_server(DEADLINE_SEC):
@@ -121,9 +119,9 @@ def send_goal(order, cancel='no'):
     def hear(message):
         feedback.append(list(message.feedback.partial_sequence))
 
-    goal = finish(client.send_goal_async(Fibonacci.Goal(order=int(order)), feedback_callback=hear))
+    goal = finish(client.send_goal_async(Fibonacci.Goal(order=order), feedback_callback=hear))
     accepted = goal.accepted
-    if cancel == 'cancel':
+    if 'cancel' in options:
         while not feedback:
             rclpy.spin_once(node, timeout_sec=1.0)
         finish(goal.cancel_goal_async())
@@ -136,18 +134,14 @@ def send_goal(order, cancel='no'):
     }
 
 
-SERVERS = {
-    'add_two_ints_server': lambda: serve_sums('add_two_ints'),
-    'calculator_server': serve_calculator,
-    'fibonacci_server': serve_fibonacci,
-}
 CLIENTS = {'ask_for_sum': ask_for_sum, 'set_operation': set_operation, 'send_goal': send_goal}
 
 if __name__ == '__main__':
-    role, *arguments = sys.argv[1:]
+    role, *calls = sys.argv[1:]
     rclpy.init()
-    node = rclpy.create_node('calculator_server' if 'calc' in role else 'external_peer')
-    if role in SERVERS:
-        SERVERS[role](*arguments)
+    node = rclpy.create_node('calculator_server' if role == 'serve' else 'external_peer')
+    if role == 'serve':
+        serve()
     else:
-        sys.stdout.write(f'result {json.dumps(CLIENTS[role](*arguments))}\n')
+        results = [CLIENTS[name](*arguments) for name, *arguments in json.loads(*calls)]
+        sys.stdout.write(f'result {json.dumps(results)}\n')
