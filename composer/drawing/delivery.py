@@ -5,7 +5,7 @@ A running system may send where the file hands over, as long as somebody outside
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Final
 
 from composer.checks.placement.crossings import why_crossing
 from composer.language.qos import (
@@ -19,13 +19,11 @@ from composer.language.qos_conflicts import find_qos_conflicts
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from composer.checks.connections.topology import Channel, Endpoint
     from composer.language.specs import QosSpec
     from composer.yaml_text.positions import DataPath
-
-Way: TypeAlias = Literal['local', 'sent', 'both', '']
 
 OUTSIDE: Final = 'external: true'
 
@@ -40,7 +38,7 @@ class Delivery:
         reason: Why it is sent.
     """
 
-    way: Way = ''
+    way: str = ''
     reason: str = ''
 
     def __str__(self) -> str:
@@ -48,19 +46,14 @@ class Delivery:
         return ', '.join(filter(None, (self.way, self.reason)))
 
 
-def deliveries_of(
-    channel: Channel, profiles: Mapping[str, QosSpec]
-) -> Iterator[tuple[DataPath, Delivery]]:
-    """Yield the path of each end of a channel, and the way of what it sends or gets.
-
-    Args:
-        profiles: The named profiles of the file.
-    """
+def deliveries_of(channel: Channel, profiles: Mapping[str, QosSpec]) -> dict[DataPath, Delivery]:
+    """Return the way of what each end of a channel sends or gets, by the path of the end."""
     is_topic = channel.kind == 'topic'
     policies = {end.path: policies_of(end, profiles) for end in channel.ends}
     senders, receivers = channel.providers, channel.users
     if not is_topic:
         senders, receivers = receivers, senders
+    sent: dict[DataPath, Delivery] = {}
     heard: dict[DataPath, list[Delivery]] = {end.path: [] for end in receivers}
     for sender in senders:
         matched = [end for end in receivers if not is_topic or _matches(sender, end, policies)]
@@ -80,12 +73,10 @@ def deliveries_of(
         ]
         reason = next(filter(None, reasons), '')
         delivery = Delivery('sent' if reason else 'local', reason)
-        delivery = delivery if matched or goes_outside else Delivery()
+        sent[sender.path] = delivery if matched or goes_outside else Delivery()
         for end in matched:
             heard[end.path].append(delivery)
-        yield sender.path, delivery
-    for end in receivers:
-        yield end.path, _join(heard[end.path])
+    return sent | {path: _join(deliveries) for path, deliveries in heard.items()}
 
 
 def policies_of(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any] | None:

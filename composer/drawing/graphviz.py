@@ -78,7 +78,6 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
     """Return a picture as a directed graph; each element has an `id` and a `class` for SVG.
 
     Args:
-        picture: What is drawn.
         folded: See `arrange_shapes`.
         direction: Of messages, as Graphviz names it: `LR` or `TB`.
     """
@@ -99,9 +98,10 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
 
 def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
-    for shape in region.drawn_shapes():
+    folded = [inner.as_shape() for inner in region.inner if inner.is_folded]
+    for shape in (*region.shapes, *folded):
         yield f'{indent}{shape.token} {_look(shape, _SHAPES)}'
-    for inner in region.open_regions():
+    for inner in (inner for inner in region.inner if not inner.is_folded):
         yield f'{indent}subgraph cluster_{inner.token} {{'
         yield (
             f'{indent}  graph [label=<{_text(inner.title)}>, id="{inner.token}", '
@@ -132,8 +132,7 @@ def _font(line: str, colour: str) -> str:
 
 def _text(text: str) -> str:
     # A backslash begins an escape in these labels, too.
-    text = text.replace('\\', '\\\\')
-    return html.escape(text)
+    return html.escape(text.replace('\\', '\\\\'))
 
 
 def _quote(text: str) -> str:
@@ -145,7 +144,6 @@ def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 
     """Return a picture as an SVG document.
 
     Args:
-        picture: What is drawn.
         folded: See `arrange_shapes`.
         direction: See `render_dot`.
 
@@ -179,9 +177,6 @@ def lay_out(text: str) -> str:
     except subprocess.TimeoutExpired as error:
         message = f'Graphviz found no layout in {_LIMIT_SEC:g} s'
         raise ComposerError(message, help='draw it as dot, and lay that out otherwise') from error
-    except OSError as error:
-        message = f'cannot run Graphviz: {error.strerror}'
-        raise ComposerError(message, help=_MISSING_HELP) from error
     svg = done.stdout.decode(errors='replace')
     if done.returncode or '</svg>' not in svg:
         said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]

@@ -54,11 +54,11 @@ def render_mermaid(picture: Picture) -> str:
 
 def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
-    for shape in region.drawn_shapes():
+    for shape in region.shapes:
         opening, closing = _SHAPES[shape.kind]
         style = f'{closing}:::{shape.mark or shape.kind}'
         yield f'{indent}{shape.token}{opening}"{_label(shape)}"{style}'
-    for inner in region.open_regions():
+    for inner in region.inner:
         yield f'{indent}subgraph {inner.token}["{_escape(inner.title)}"]'
         yield from _region(inner, depth + 1)
         yield f'{indent}end'

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Diagnostic
     from composer.drawing.delivery import Delivery
     from composer.entity_kinds import ChannelKind
-    from composer.language.specs import ConditionSpec, NodeSpec, QosSpec
+    from composer.language.specs import QosSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
 NodeKind: TypeAlias = Literal['node', 'process']
@@ -284,7 +284,7 @@ def _common_place(places: Sequence[Place]) -> Place:
 
 def _edges(context: CheckContext, places: Places, ids: Mapping[DataPath, str]) -> Iterator[Edge]:
     for channel in context.topology.channels.values():
-        deliveries = dict(deliveries_of(channel, context.spec.qos))
+        deliveries = deliveries_of(channel, context.spec.qos)
         for end in channel.ends:
             # A process may have several nodes; components are drawn apart.
             boxed = end.node.path if end.node.path in ids else end.node.path[:2]
@@ -327,8 +327,13 @@ def sends(channel: str, *, provides: bool) -> bool:
 def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) -> Iterator[Wait]:
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
-            if (target := _target(waiter, condition)) in known:
-                yield Wait(ids[waiter.path], target, condition.path)
+            kind, name = condition.kind, condition.name
+            if kind == 'node':
+                name = expand_name(name, waiter.name, waiter.namespace or '/')
+            elif kind != 'process':
+                name = full_name(waiter, kind, name)
+            if f'{kind}:{name}' in known:
+                yield Wait(ids[waiter.path], f'{kind}:{name}', condition.path)
     for component in context.spec.components:
         # It is drawn at its container.
         yield Wait(ids[component.path], f'process:{component.container}', component.path)
@@ -336,11 +341,3 @@ def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) 
         for action in process.on_exit:
             if f'process:{action.start}' in known:
                 yield Wait(f'process:{action.start}', ids[process.path], action.path)
-
-
-def _target(waiter: NodeSpec | ProcessSpec | ComponentSpec, condition: ConditionSpec) -> str:
-    if condition.kind == 'process':
-        return f'process:{condition.name}'
-    if condition.kind == 'node':
-        return f'node:{expand_name(condition.name, waiter.name, waiter.namespace or "/")}'
-    return f'{condition.kind}:{full_name(waiter, condition.kind, condition.name)}'

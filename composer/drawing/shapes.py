@@ -85,20 +85,11 @@ class Region:
         """Return the shapes in it and in all regions below."""
         return [*self.shapes, *(shape for each in self.inner for shape in each.all_shapes())]
 
-    def drawn_shapes(self) -> list[Shape]:
-        """Return the shapes in it, and those of the folded regions in it."""
-        folded = (region.as_shape() for region in self.inner if region.is_folded)
-        return [*self.shapes, *folded]
-
     def as_shape(self) -> Shape:
         """Return what is drawn for all of it when it is folded."""
         hidden = self.all_shapes()
         details = count_kinds(shape.kind for shape in hidden)
         return Shape(self.token, 'folded', self.title, details, mark=_worst(hidden))
-
-    def open_regions(self) -> list[Region]:
-        """Return the regions in it that are not folded."""
-        return [region for region in self.inner if not region.is_folded]
 
 
 @record
@@ -121,7 +112,6 @@ def arrange_shapes(picture: Picture, folded: Collection[str] = ()) -> Arrangemen
     """Return the shapes and lines of a picture.
 
     Args:
-        picture: What is drawn.
         folded: The ids of regions that are drawn as one shape.
     """
     tokens, marks = picture.tokens(), _marks(picture)

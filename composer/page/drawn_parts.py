@@ -7,7 +7,7 @@ import threading
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 from composer.application.file_selection import load_given
@@ -86,11 +86,7 @@ def _find_code(context: CheckContext, owner: str, behaviour: BehaviourSpec) -> E
 class Drawing:
     """A system as it is drawn, as a whole and with folded boxes.
 
-    Args:
-        code: The lines of the functions of each node, by its id.
-
     Attributes:
-        name: Of the system.
         nodes: The full names of the nodes.
         topics: Those of the topics.
         topic_of_ends: The topic of each publisher and subscription, by the ids of these.
@@ -124,7 +120,7 @@ class Drawing:
         """Draw the ends outside of topics from now on, besides those that the files declare.
 
         Args:
-            outside: See `OutsideEnds`.
+            outside: See `find_outside`.
         """
         sides: dict[str, Side] = {'publisher': 'providers', 'subscription': 'users'}
         channels = []
@@ -137,18 +133,15 @@ class Drawing:
             self._fold.cache_clear()
 
     def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
+        # Graphviz has another process for each.
         with ThreadPoolExecutor() as pool:
-            # Graphviz has another process for it.
-            layouts = {
-                each: pool.submit(render_svg, self._picture, folded, each)
-                for each in self._directions
-            }
-            drawn = arrange_shapes(self._picture, folded)
-            parts = dict(_parts(self._picture, self._code))
-            parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
-            parts |= dict(_bundles(drawn, parts))
-        documents = {each: _inlined(layout.result()) for each, layout in layouts.items()}
+            layouts = pool.map(partial(render_svg, self._picture, folded), self._directions)
+            documents = dict(zip(self._directions, map(_inlined, layouts), strict=True))
         self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
+        drawn = arrange_shapes(self._picture, folded)
+        parts = dict(_parts(self._picture, self._code))
+        parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
+        parts |= dict(_bundles(drawn, parts))
         owners = {index: token for token in reversed(parts) for index in parts[token]['findings']}
         findings = [
             {**describe_finding(finding), 'part': owners.get(index)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,16 +21,10 @@ def list_problems(
     """Return problems as the page lists them: `level`, `text` and `node`, which may be empty.
 
     Args:
-        outside: See `OutsideEnds`.
+        outside: See `find_outside`.
         topics: The topic of each publisher and subscription, by its kind, node and name.
     """
-    found = [*_of_status(status), *_of_processes(health), *_of_entities(health, topics)]
-    found += [
-        _problem('warn', end['problem'], end['problem_at'])
-        for ends in outside.values()
-        for end in ends
-        if 'problem' in end
-    ]
+    found = [*_of_system(status, health, outside), *_of_entities(health, topics)]
     return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))
 
 
@@ -37,7 +32,11 @@ def _problem(level: str, text: str, node: str = '') -> dict[str, str]:
     return {'level': level, 'text': text, 'node': node}
 
 
-def _of_status(status: dict[str, Any]) -> Iterator[dict[str, str]]:
+def _of_system(
+    status: dict[str, Any],
+    health: dict[str, Any],
+    outside: Mapping[str, list[dict[str, str]]],
+) -> Iterator[dict[str, str]]:
     if status.get('last_error'):
         yield _problem('error', f'the last reload failed: {status["last_error"]}')
     for node in status.get('stopped', ()):
@@ -45,15 +44,15 @@ def _of_status(status: dict[str, Any]) -> Iterator[dict[str, str]]:
     for node, state in status.get('lifecycles', {}).items():
         if state != 'active':
             yield _problem('warn', f'{node} is {state}, and not active', node)
-
-
-def _of_processes(health: dict[str, Any]) -> Iterator[dict[str, str]]:
     for process in health.get('external_processes', ()):
         if process['level'] != 'ok':
             yield _problem(process['level'], f"process '{process['name']}': {process['message']}")
         elif process['restarts']:
             times = f'{process["restarts"]} times'
             yield _problem('warn', f"process '{process['name']}' was restarted {times}")
+    for end in chain(*outside.values()):
+        if 'problem' in end:
+            yield _problem('warn', end['problem'], end['problem_at'])
 
 
 def _of_entities(health: dict[str, Any], topics: Mapping[str, str]) -> Iterator[dict[str, str]]:

@@ -20,7 +20,7 @@ from composer.application.watched_files import WatchedFiles
 from composer.diagnostics import describe_finding
 from composer.errors import ComposerError
 from composer.page.drawn_parts import draw_files
-from composer.page.outside import OutsideEnds
+from composer.page.outside import find_outside
 from composer.page.problems import list_problems
 from composer.planning.text import render_plan
 from composer.runtime.control import protocol
@@ -72,7 +72,7 @@ class WatchedSystem:
         self.looked_at = monotonic()
         self._saved: SavedFiles | None = None
         self._numbers = count(1)
-        self._outside = OutsideEnds()
+        self._outside: dict[str, list[dict[str, str]]] = {}
         self._ended = Event()
         self._thread = Thread(target=self._run, name='composer-page', daemon=True)
         # What is asked, as a reload, may take long: what is watched stays fresh meanwhile.
@@ -150,7 +150,6 @@ class WatchedSystem:
                 found = self._read_health(health)
                 next_health = begun + found['period_sec']
                 self._note_heard(said, found)
-            outside = self._outside.by_topic
             topics = self.drawing.topic_of_ends if self.drawing else {}
             self.state = self.state | {
                 'name': said['name'],
@@ -158,8 +157,8 @@ class WatchedSystem:
                 'problem': found.get('problem', ''),
                 'status': said,
                 'health': found,
-                'outside': outside,
-                'problems': list_problems(said, found, outside, topics),
+                'outside': self._outside,
+                'problems': list_problems(said, found, self._outside, topics),
                 'next': self._saved and self._saved.next_plan,
             }
             # A silent worker takes a second of the pause: the others do not seem old for it.
@@ -200,20 +199,21 @@ class WatchedSystem:
             paths = [file, *(Path(each) for each in given['layers'])]
             self._saved = SavedFiles(text, paths, given['words'], given['set_values'])
             drawing = draw_files(paths, given['words'], given['set_values'])
-            if self._outside.by_topic:
-                drawing.show_outside(self._outside.by_topic)
+            if self._outside:
+                drawing.show_outside(self._outside)
             self.drawing = drawing
         except ComposerError as error:
             # The page is for the same computer as the files, and shows the rest without.
             self.drawing, problem = None, str(error)
-        self._outside.forget()
         self._note_drawing(problem)
 
     def _find_outside(self, client: Client, said: dict[str, Any]) -> None:
         if (drawing := self.drawing) is not None:
             own = {*said['nodes'], *said['components'], *drawing.nodes}
-            if self._outside.look(client.node, drawing.topics, own):
-                drawing.show_outside(self._outside.by_topic)
+            outside = find_outside(client.node, drawing.topics, own)
+            if outside != self._outside:
+                self._outside = outside
+                drawing.show_outside(outside)
                 self._note_drawing()
 
     def _note_drawing(self, problem: str = '') -> None:

@@ -19,11 +19,8 @@ pytest.importorskip('rclpy')
 pytest.importorskip('starlette')
 pytest.importorskip('uvicorn')
 
-import rclpy
-
 from composer.application.running_systems.health import read_health
 from composer.page import watched_system
-from composer.page.outside import OutsideEnds
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
 from tests.running import DEADLINE_SEC, wait_for
@@ -402,18 +399,6 @@ def test_only_its_own_scripts_and_files_are_served(page):
         assert b' 400 ' in raw.recv(100) or b' 403 ' in raw.recv(100)
 
 
-def test_another_address_is_refused_with_the_way_round(shared_compose):
-    done = subprocess.run(
-        [sys.executable, '-m', 'composer', 'page', '--listen', '0.0.0.0'],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert 'not encrypted' in done.stderr
-    assert 'ssh -L' in done.stderr
-
-
 def test_a_file_is_shown_that_does_not_run(page, shared_compose):
     still = Page(shared_compose.domain_id, str(shared_compose.folder / 'system.yaml'))
     state, drawing = still.json('/api/state'), still.json('/api/drawing')
@@ -567,30 +552,6 @@ def test_ends_outside_appear_and_go(page, browser, shared_peer):
     shared_peer.run(shared_peer.node.destroy_publisher, publisher)
     wait_for(lambda: not find('main svg .external, .outside'), 'nothing outside')
     assert outside() == {}
-
-
-def test_an_end_whose_node_is_not_known_yet_is_asked_for_again(context):
-    from std_msgs.msg import String
-
-    class Discovering:
-        """Knows the ends of a node before the node's name, as while the graph is discovered."""
-
-        def __getattr__(self, name):
-            return getattr(node, name)
-
-        def get_publishers_info_by_topic(self, topic):
-            ends = node.get_publishers_info_by_topic(topic)
-            for end in ends if not knows_names else ():
-                end.node_name = '_NODE_NAME_UNKNOWN_'
-            return ends
-
-    node = rclpy.create_node('other', context=context)
-    node.create_publisher(String, '/words', 1)
-    ends, knows_names = OutsideEnds(), False
-    assert not ends.look(Discovering(), ['/words'], ())
-    knows_names = True
-    assert ends.look(Discovering(), ['/words'], ())
-    assert [end['node'] for end in ends.by_topic['/words']] == ['/other']
 
 
 SCRIPTS = [
