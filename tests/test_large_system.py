@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from composer.cli.main import run
-from tests.graphs import Graph
+from composer.language.pipeline import load_system
 
 ARGUMENTS = ('robot.yaml', 'site.yaml', 'rate:=7.5', '--set', 'nodes.robot_0.log_level=fatal')
 SET = '--set nodes.robot_0.log_level=fatal'
@@ -163,13 +163,29 @@ def test_it_is_as_large_as_real_ones_and_has_no_findings(system, shown):
     assert ': ok, ' in shown('check', 'robot.yaml', '--strict')
 
 
+def told_of(system):
+    """Return the parameters and the publishers of each node."""
+    return {
+        node.full_name: (
+            {name: spec.value for name, spec in node.parameters.items()},
+            {name: (spec.type, spec.topic) for name, spec in node.publishers.items()},
+        )
+        for node in system.spec.nodes.values()
+    }
+
+
 def test_what_is_shown_is_shown_the_same_again(system, shown, tmp_path):
-    first = shown('show', *ARGUMENTS)
+    words = ['rate:=7.5']
+    first = shown('show', 'robot.yaml', 'site.yaml', *words)
     flat = tmp_path / 'flat.yaml'
     flat.write_text(first)
     assert shown('show', flat) == first
     assert ': ok, ' in shown('check', flat, '--strict')
     assert first.count('period: 1.0') > 70
+    layers = [Path('site.yaml')]
+    assert told_of(load_system(flat)) == told_of(
+        load_system(Path('robot.yaml'), words, layers=layers)
+    )
 
 
 def test_each_value_is_said_to_come_from_where_it_is_written(system, shown):
@@ -225,25 +241,3 @@ def test_a_finding_in_the_deepest_file_is_said_there_with_all_includes(system, c
     assert ('joint', 'arm', 'robot') in names or ('wheel', 'base', 'robot') in names
     chain = next(each for each in chains if 'arm.yaml' in ' '.join(each))
     assert chain[0].startswith(f'{line_of("joint passes")}:')
-
-
-@pytest.mark.ros
-@pytest.mark.long
-def test_what_is_shown_runs_as_the_same_system(system, shown, compose, wait_for):
-    flat = compose.folder / 'flat.yaml'
-    flat.write_text(shown('show', *ARGUMENTS))
-    count = flat.read_text().count('type: std_msgs/msg/String')
-    graphs = []
-    for arguments, folder in ((ARGUMENTS, system), ((flat,), compose.folder)):
-        child = compose.run(*arguments, folder=folder)
-        node_count = int(re.search(r'(\d+) nodes ready', child.wait_until_ready())[1])
-        graph = Graph(compose.domain_id)
-        wait_for(lambda graph=graph, n=node_count: len(graph.nodes()) >= n, 'the nodes')
-        wait_for(lambda graph=graph: len(graph.ends()) >= count, 'the ends of topics')
-        driver = '/left/joint_1/driver'
-        graphs.append((graph.nodes(), graph.ends(), graph.parameters([driver])))
-        graph.close()
-        assert child.stop() == 0
-    assert graphs[0] == graphs[1]
-    assert {'rate', 'index'} <= graphs[0][2][driver].keys()
-    assert 'integer_value=5' in graphs[0][2][driver]['index']

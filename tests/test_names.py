@@ -165,11 +165,6 @@ def test_a_wrong_topic_says_what_is_wrong(name, finding):
     assert find_topic_name_problem(name) == finding
 
 
-def test_the_kind_of_name_is_said():
-    assert find_topic_name_problem('', 'service') == 'a service name is not empty'
-    assert find_topic_name_problem('', 'action') == 'an action name is not empty'
-
-
 @pytest.mark.parametrize(
     ('name', 'finding'),
     [
@@ -196,11 +191,6 @@ def test_a_wrong_node_says_what_is_wrong(name, finding):
 )
 def test_a_wrong_namespace_says_what_is_wrong(name, finding):
     assert find_namespace_problem(name) == finding
-
-
-@pytest.mark.parametrize('name', ['', '/', 'a', '/a', 'a/b', '_1'])
-def test_a_namespace_may_be_relative(name):
-    assert find_namespace_problem(name) is None
 
 
 @pytest.mark.parametrize(

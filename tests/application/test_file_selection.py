@@ -1,7 +1,5 @@
 """Which files a command line means; other people's YAML in a folder is left alone."""
 
-import os
-
 import pytest
 
 from composer.application.file_selection import looks_like_system, select_files
@@ -74,12 +72,6 @@ def test_nothing_is_a_finding(tree, tmp_path):
     )
 
 
-def test_named_files_can_be_passed_over_too(tree):
-    tree(one_yaml=SYSTEM, compose_yaml=COMPOSE)
-    words = ('one.yaml', 'compose.yaml', 'missing.yaml')
-    assert select(*words, skip_other_files=True) == (['one.yaml', 'missing.yaml'], [])
-
-
 def test_standard_input_is_a_dash():
     assert select('-', '-') == (['-'], [])
 
@@ -129,20 +121,6 @@ def test_what_others_write_is_left_alone(tmp_path, text):
     path = tmp_path / 'a.yaml'
     path.write_text(text)
     assert not looks_like_system(path)
-
-
-def test_a_pipe_in_a_folder_is_not_waited_for(tree, tmp_path):
-    tree(one_yaml=SYSTEM)
-    os.mkfifo(tmp_path / 'pipe.yaml')
-    assert select('.') == (['one.yaml'], [])
-
-
-def test_a_pattern_ends_where_links_lead_back(tree, tmp_path):
-    tree(one_yaml=SYSTEM)
-    for name in ('a', 'b'):
-        (tmp_path / name).symlink_to('.')
-    assert select('**/*.yaml') == (['one.yaml'], [])
-    assert select(f'{tmp_path}/**/*.yaml') == ([str(tmp_path / 'one.yaml')], [])
 
 
 def test_a_pattern_matches_nothing_that_is_hidden(tree, tmp_path):

@@ -4,7 +4,6 @@ import os
 import shutil
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
@@ -194,11 +193,3 @@ def test_without_the_kernel_files_are_looked_at(tmp_path, watch, monkeypatch):
         path.write_text(text)
         watcher.wait_for(text)
     assert watcher.told == ['files are looked at twice a second: OS file watch limit reached']
-
-
-def test_files_are_still_when_nothing_is_written(tmp_path):
-    path = Path(tmp_path / 'robot.yaml')
-    files = WatchedFiles([path], 0)
-    assert files.are_still(threading.Event())
-    path.write_text('new')
-    assert not files.are_still(threading.Event())

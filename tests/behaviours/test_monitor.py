@@ -50,15 +50,6 @@ def test_a_topic_that_was_never_heard_is_stale_after_a_while(behaviour_node, set
     assert [watched.tick() for _ in range(4)] == [None, True, True, False]
 
 
-def test_topics_of_one_node_are_watched_apart(behaviour_node, set_time):
-    set_time(100.0)
-    scans, images = (watch(behaviour_node, name, minimum_rate=1.0) for name in ('scan', 'image'))
-    assert (next(scans), next(images)) == (None, None)
-    count(behaviour_node.with_own_state(), None, 'image')
-    set_time(101.0)
-    assert (next(scans), next(images)) == (False, True)
-
-
 def test_diagnostics_tell_rate_age_and_finding(behaviour_node, set_time):
     watched = Watched(behaviour_node, set_time, diagnose, minimum_rate=5.0, maximum_age=2.0)
     watched.tick()
@@ -79,17 +70,3 @@ def test_diagnostics_tell_rate_age_and_finding(behaviour_node, set_time):
         ),
     ]
     assert array.header.stamp.sec == 103
-
-
-def test_what_is_beyond_its_limit_is_not_shown_as_the_limit(behaviour_node, set_time):
-    watched = Watched(behaviour_node, set_time, diagnose, minimum_rate=1.0, maximum_age=2.5)
-    watched.tick()
-    found = []
-    for messages in (1, 0, 0):
-        watched.time += 0.0002
-        found.append(watched.tick(messages)['status'][0]['message'])
-    assert found == [
-        '0.9998 messages/s, at least 1 expected',
-        '0 messages/s, at least 1 expected',
-        'no message for 2.5004 s, at most 2.5 s expected',
-    ]

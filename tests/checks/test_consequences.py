@@ -87,14 +87,6 @@ def test_a_qos_with_an_unknown_profile_matches_everything(check, qos):
     assert check(talker, installed=False) == [(4, 'unknown-qos-profile')]
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize('interfaces', ['null', '[a]', '5'])
-def test_packages_of_interfaces_that_cannot_be_read_are_not_missed(check, interfaces):
-    nodes = spoil(SYSTEM, 'std_msgs/msg/String', 'my_msgs/msg/Text')
-    nodes = spoil(nodes, 'std_msgs/msg/String', 'my_msgs/msg/Text')
-    assert check(nodes, CODE, before=f'interfaces: {interfaces}\n') == [(2, 'wrong-type')]
-
-
 def test_a_module_that_is_not_python_is_one_finding(check):
     nodes = """
   n:
@@ -105,21 +97,6 @@ def test_a_module_that_is_not_python_is_one_finding(check):
     on_start: parts:one
 """
     assert check(nodes, 'def one(:\n    pass\n') == [(1, 'broken-module')]
-
-
-def test_a_behaviour_in_no_module_hides_no_unknown_parameter(check):
-    nodes = """
-  n:
-    parameters: {speed: 1}
-    timers:
-      a: {period: 1, behaviour: nowhere:tick}
-      b: {period: 1, behaviour: parts:tick}
-"""
-    code = """
-        def tick(node):
-            return node.parameters.spede
-    """
-    assert sorted(check(nodes, code)) == [(3, 'unknown-parameter'), (6, 'unknown-behaviour')]
 
 
 @pytest.mark.parametrize(
@@ -139,14 +116,3 @@ def test_a_misspelt_key_hides_only_what_it_may_have_declared(check, key, hides):
     found = {rule for _, rule in check(nodes, code)}
     assert ('unknown-parameter' in found) is not hides
     assert 'unknown-key' in found
-
-
-@pytest.mark.parametrize('spoilt', ['"a b"', '1st'])
-def test_a_parameter_file_may_be_for_a_node_without_a_right_name(check, tmp_path, spoilt):
-    (tmp_path / 'site.yaml').write_text('/talker:\n  ros__parameters: {speed: 1}\n')
-    nodes = f"""
-  {spoilt}:
-    parameters: {{speed: 1}}
-    parameter_files: [site.yaml]
-"""
-    assert check(nodes) == [(3, 'bad-name')]

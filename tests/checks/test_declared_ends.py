@@ -88,13 +88,6 @@ def test_names_are_those_of_the_process():
     assert not check(camera + BASE)
 
 
-def test_private_names_are_unknown_where_the_name_of_the_node_is():
-    camera = CAMERA.replace('    image: {', '    image: {topic: ~/image, ')
-    assert not check(camera + BASE)
-    (finding,) = check(camera.replace('msg/Image', 'msg/Imu') + BASE)
-    assert (finding.rule, finding.span.text) == ('no-publisher', 'image')
-
-
 SEVERAL = """\
 robot:
   command: ['true']
@@ -113,11 +106,6 @@ def test_each_node_of_a_process_has_its_own_ends():
     assert not check(SEVERAL % '{subscriptions: {cmd_vel: geometry_msgs/msg/Twist}}')
     (finding,) = check(SEVERAL % '{}')
     assert (finding.rule, finding.span.text) == ('no-subscription', 'cmd_vel')
-
-
-@pytest.mark.parametrize('unknown', ['null', '{subscriptions: {cmd_vel: }}'])
-def test_nothing_is_missed_while_the_ends_of_a_node_are_not_known(unknown):
-    assert not [each for each in check(SEVERAL % unknown) if each.rule.startswith('no-')]
 
 
 def test_a_process_without_declarations_may_have_anything():
@@ -219,34 +207,6 @@ robot:
 def test_values_are_compared_with_the_parameters_that_are_declared(given, finding):
     found = check(PARAMETERS % given, 'nodes: {}\n')
     assert [(each.rule, each.help) for each in found] == ([finding] if finding else [])
-
-
-def test_a_parameter_declared_beside_the_values_is_given_its_default():
-    text = """\
-version: 1
-processes:
-  robot:
-    command: ['true']
-    parameters: {rate: {type: double, default: 2}, name: {type: string}, pose: {type: 2, x: 1.0}}
-"""
-    system = load_system_text(text)
-    process = system.spec.processes['robot']
-    assert process.parameters == {'rate': 2.0, 'pose': {'type': 2, 'x': 1.0}}
-    assert not process.declares_all_ends
-    assert not check_system(system, InterfaceCatalogue())
-
-
-def test_what_is_waited_for_may_be_what_a_process_provides():
-    nodes = NODES.replace(
-        'detector:\n', 'detector:\n    wait_for: [{topic: imgae}, {topic: image}, {node: bse}]\n'
-    )
-    found = check(CAMERA + BASE.replace('command', 'name: base\n  command'), nodes)
-    assert [(each.rule, each.help) for each in found] == [
-        ('likely-misspelling', "did you mean 'image'?"),
-    ]
-    waiting = CAMERA.replace('  publishers:', '  wait_for: {node: detector}\n  publishers:')
-    (finding,) = check(waiting + BASE, nodes.replace('imgae}, {topic: ', ''))
-    assert finding.rule == 'wait-cycle'
 
 
 def test_an_included_file_has_its_own_namespace_and_profiles(tmp_path):

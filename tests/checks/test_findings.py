@@ -76,19 +76,6 @@ def test_without_ros_types_are_taken_as_they_are(case, monkeypatch):
     assert render(case, monkeypatch, nothing_installed) == '\n'
 
 
-def test_what_is_shared_through_an_alias_is_reported_once(tmp_path):
-    path = tmp_path / 'shared.yaml'
-    path.write_text(
-        'version: 1\n'
-        'x-tick: &tick {period: 1, behaviour: nowhere:tick}\n'
-        'nodes: {a: {timers: {one: *tick, two: *tick}}, b: {timers: {three: {<<: *tick}}}}\n'
-    )
-    findings = check_system(load_system(path), InterfaceCatalogue())
-    assert [(finding.rule, finding.span.line) for finding in findings] == [
-        ('unknown-behaviour', 2)
-    ]
-
-
 def test_a_bad_namespace_of_the_defaults_is_shown_with_what_lies_in_it(tmp_path):
     file = tmp_path / 'system.yaml'
     file.write_text('version: 1\ndefaults: {namespace: /a-b}\nnodes: {n: {namespace: c}}\n')
@@ -96,16 +83,3 @@ def test_a_bad_namespace_of_the_defaults_is_shown_with_what_lies_in_it(tmp_path)
     findings = [each for each in said if each.rule == 'bad-name']
     assert [each.span.line for each in findings] == [3]
     assert [each.span.line for each in findings[0].related] == [2]
-
-
-def test_an_argument_whose_expression_fails_is_not_missed_again(tmp_path):
-    (tmp_path / 'taking.py').write_text('def send(node, order): ...\n')
-    path = tmp_path / 'system.yaml'
-    path.write_text(
-        'version: 1\n'
-        'nodes:\n'
-        '  a:\n'
-        '    on_start: {behaviour: taking:send, with: {order: "{{ ordr }}"}}\n'
-    )
-    findings = check_system(load_system(path), InterfaceCatalogue())
-    assert [finding.rule for finding in findings] == ['undefined-name']

@@ -3,7 +3,6 @@
 import pytest
 
 from composer.checks.checker import check_system
-from composer.input_limits import MAX_FINDINGS
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 
@@ -49,13 +48,6 @@ def test_a_rule_that_the_comment_does_not_name_is_heard(check):
     assert [finding[:3] for finding in found] == [('error', 'bad-signature', 4)]
 
 
-def test_several_rules_are_silenced_at_once(check):
-    line = 'on_start: {behaviour: driving:steer, with: {speed: 1}}'
-    assert [finding[1] for finding in check(f'    {line}\n')] == ['bad-signature', 'bad-argument']
-    ignore = 'composer: ignore[bad-signature, bad-argument]'
-    assert check(f'    {line}  # {ignore}\n') == []
-
-
 def test_an_unknown_rule_is_a_warning_with_the_nearest_one(check):
     assert check('    log_level: info  # composer: ignore[bad-signatur]\n') == [
         ('warning', 'unknown-rule', 4, "there is no rule 'bad-signatur'")
@@ -96,11 +88,3 @@ def test_while_findings_hide_others_no_comment_is_called_unused(check):
         '    log_levl: info\n    on_start: driving:start  # composer: ignore[bad-name]\n'
     )
     assert [finding[1] for finding in found] == ['unknown-key']
-
-
-def test_silenced_findings_leave_room_for_the_others(check):
-    comment = '# composer: ignore[unused-publisher, no-subscription]'
-    line = '      p{}: {{type: std_msgs/msg/String, topic: t{}}}  {}\n'
-    lines = [line.format(index, index, comment) for index in range(MAX_FINDINGS + 10)]
-    found = check('    publishers:\n' + ''.join(lines) + line.format('x', 'x', ''))
-    assert {line for *_, line, _ in found} == {len(lines) + 5}

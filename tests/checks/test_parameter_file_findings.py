@@ -175,12 +175,6 @@ def test_a_value_that_its_declaration_refuses_is_an_error_at_the_value(check, wr
     assert value
 
 
-def test_a_value_that_a_later_file_replaces_is_not_held_against_the_declaration(check):
-    nodes = ARM.replace('[p.yaml]', '[p.yaml, q.yaml]')
-    texts = ['/**: {ros__parameters: {speed: 9.0}}', '/**: {ros__parameters: {speed: 1.0}}']
-    assert check(nodes, p=texts[0], q=texts[1]) == []
-
-
 @pytest.mark.parametrize(
     ('name', 'help_text'),
     [
@@ -216,24 +210,6 @@ def test_a_file_that_several_nodes_use_is_spoken_of_once(check):
     ]
 
 
-def test_what_one_of_several_nodes_declares_is_not_undeclared(check):
-    nodes = """
-      a: {parameter_files: [p.yaml], parameters: {speed: 1.0}}
-      b: {parameter_files: [p.yaml], parameters: {mode: x}}
-    """
-    assert check(nodes, p='/**: {ros__parameters: {speed: 2.0, mode: z}}') == []
-
-
-def test_what_is_for_a_node_left_out_by_its_when_is_not_unmatched(check):
-    nodes = """
-      a: {parameter_files: [p.yaml], parameters: {speed: 1.0}}
-      b: {when: false, parameter_files: [p.yaml], parameters: {mode: x}}
-    """
-    text = 'a: {ros__parameters: {speed: 2.0}}\nb: {ros__parameters: {mode: y}}\n'
-    assert check(nodes, p=text) == []
-    assert check(nodes, p=text.replace('mode', 'mood'))[0].startswith('p.yaml:2:23 undeclared-')
-
-
 def test_a_value_that_never_counts_is_a_warning(check):
     def said(text):
         return check(ARM, p=text)
@@ -248,29 +224,6 @@ def test_a_value_that_never_counts_is_a_warning(check):
         "→ the last name that matches a node wins: write '/**' above"
     ]
     assert said('/**: {ros__parameters: {mode: slow}}\n' + head) == []
-
-
-@pytest.mark.parametrize(
-    ('upper', 'lower', 'is_lost'),
-    [
-        ('/*/arm', '/**', True),
-        ('/**', '/*/*', False),
-        ('/*/arm', '/robot/*', False),
-    ],
-)
-def test_a_wider_name_below_takes_what_stands_above(check, upper, lower, is_lost):
-    text = ''.join(f'{name}: {{ros__parameters: {{mode: slow}}}}\n' for name in (upper, lower))
-    found = [line.split(': ')[0] for line in check(ARM, p=text)]
-    assert found == [f'p.yaml:1:{len(upper) + 22} overridden-parameter'] * is_lost
-
-
-def test_a_later_file_that_loses_by_its_type_is_a_warning(check):
-    nodes = ARM.replace('[p.yaml]', '[p.yaml, q.yaml]')
-    texts = ['/**: {ros__parameters: {count: 1}}', '/**: {ros__parameters: {count: 1.5}}']
-    assert check(nodes, p=texts[0], q=texts[1]) == [
-        "q.yaml:1:25 overridden-parameter: 'count' never has this value: p.yaml:1 overrides it "
-        '→ of two types ROS takes one, whichever comes first: give both the same type'
-    ]
 
 
 def test_a_missing_file_is_an_error_where_it_is_named(check):
@@ -365,20 +318,3 @@ def test_the_name_of_a_programs_node_is_matched(check):
 def test_a_comment_in_the_parameter_file_silences_a_warning(check):
     text = '/**:\n  ros__parameters:\n    sped: 1.0  # composer: ignore[undeclared-parameter]\n'
     assert check(ARM, p=text) == []
-
-
-@pytest.mark.parametrize(
-    ('names', 'wrong'),
-    [
-        (['arm', 'local_costmap'], []),  # a node that the process may have beside its own
-        (['arm', 'arm2'], []),
-        (['local_costmap'], []),
-        (['amr', 'local_costmap'], ['amr']),
-        (['arm', 'arrm'], ['arrm']),
-    ],
-)
-def test_a_process_may_have_nodes_that_nobody_knows(check, names, wrong):
-    process = '{command: [nav], name: arm, namespace: "", parameter_files: [p.yaml]}'
-    text = ''.join(f'{name}: {{ros__parameters: {{a: 1}}}}\n' for name in names)
-    found = check('  a: {}\n', more=f'processes: {{nav: {process}}}\n', p=text)
-    assert [line.split("'")[1] for line in found if 'unmatched' in line] == wrong

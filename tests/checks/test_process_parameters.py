@@ -75,20 +75,10 @@ containers:
     ]
 
 
-def test_the_finding_is_at_the_item():
-    assert [text for _, text, _ in findings('f: {g: [1, two]}')] == ['two']
-
-
 def test_names_in_mappings_are_names_of_parameters():
     assert findings('f: {g h: 1}') == [
         ('bad-name', 'g h', "'f.g h': a parameter name has no spaces")
     ]
-
-
-def test_what_is_left_out_is_checked_too():
-    left_out = (SYSTEM % 'f: null').replace('{command', '{when: false, command')
-    system = load_system_text(left_out + "  other: {command: ['true']}\n")
-    assert [each.rule for each in check_system(system, InterfaceCatalogue())] == ['bad-parameter']
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,7 @@ from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.ros_parameters.rcl_values import read_plain_scalar
-from composer.yaml_text.reader import parse_document
 from composer.yaml_text.scalars import BOOLS_OF_YAML_1_1, parse_plain_scalar
-from composer.yaml_text.writer import render_yaml
 
 SYSTEM = """\
 version: 1
@@ -76,20 +74,8 @@ def test_what_is_declared_a_text_is_one(find, section, entry, found):
     assert find(section, entry) == found
 
 
-def test_a_setting_of_the_command_line_is_found(find):
-    found = find('node', 'x: true', 'nodes.n.parameters.x=no')
-    assert found == [(TEXT, 'no', EITHER)]
-
-
 def test_the_words_are_those_that_ros_reads_as_bools():
     for word in ('y', 'n', 'yes', 'no', 'on', 'off', 'true', 'false', 'oN', 'nO'):
         for spelling in (word, word.title(), word.upper()):
             value = read_plain_scalar(spelling)
             assert BOOLS_OF_YAML_1_1.get(spelling, parse_plain_scalar(spelling)) == value
-
-
-def test_what_composer_writes_has_them_in_quotes():
-    for word in BOOLS_OF_YAML_1_1:
-        text = render_yaml({'version': word})
-        assert f'"{word}"' in text
-        assert parse_document(text.encode(), 'x').data == {'version': word}

@@ -60,25 +60,6 @@ def test_the_way_of_messages(draw, publisher, subscription, way):
     assert found['publisher:/ear:echo'] == ('sent', 'external: true')
 
 
-def test_a_topic_with_publishers_of_both_ways(draw):
-    found = ways(
-        draw("""
-    version: 1
-    defaults: {local_delivery: false}
-    nodes:
-      one: {publishers: {words: std_msgs/msg/String}}
-      two: {publishers: {words: {type: std_msgs/msg/String, local_delivery: true}}}
-      ear:
-        subscriptions: {words: {type: std_msgs/msg/String, behaviour: parts:hear}}
-    """)
-    )
-    assert found == {
-        'publisher:/one:words': ('sent', OFF),
-        'publisher:/two:words': ('local', ''),
-        'subscription:/ear:words': ('both', OFF),
-    }
-
-
 @pytest.mark.parametrize(
     ('changed', 'service', 'action'),
     [

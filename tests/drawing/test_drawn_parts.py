@@ -106,19 +106,6 @@ def test_findings_know_what_they_are_about(data):
     assert data['parts']['e1']['findings'] == [index]
 
 
-def test_lines_that_a_setting_or_another_file_adds_are_shown_too(draw, needs_graphviz):
-    setting = 'nodes.ear.log_level=debug'
-    # In a line with the number of one of those in the first file.
-    layer = '#\n' * 13 + 'nodes: {ear: {use_sim_time: true}}\n'
-    data = as_json(Drawing(draw(SYSTEM, setting, layer=layer)).fold(()))
-    first, *added = data['parts']['n1']['excerpts']
-    assert first['file'] == 'robot.yaml'
-    assert sorted((each['file'], each['first'], each['lines']) for each in added) == [
-        ('--set nodes.ear.log_level', 1, [setting]),
-        ('site.yaml', 14, ['nodes: {ear: {use_sim_time: true}}']),
-    ]
-
-
 def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
     text = """
         version: 1
@@ -168,22 +155,3 @@ def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, box
             if token[0] == 'e':
                 inside = [end in box['members'] for end in parts[token]['near']]
                 assert (token in box['near']) == (sum(inside) == 1)
-
-
-def test_variables_of_processes_are_in_no_lines(draw, needs_graphviz):
-    text = """
-        version: 1
-        processes:
-          one: {command: [sh], env: {TOKEN: secret}}
-          two:
-            env:
-              TOKEN: |
-                secret
-            command: [sh]
-    """
-    picture = draw(text, 'processes.two.env.MORE=secret')
-    data = as_json(Drawing(picture).fold(()))
-    one, two = (data['parts'][token]['excerpts'] for token in ('n0', 'n1'))
-    assert one[0]['lines'] == ['  one: {command: [sh], …']
-    assert two[0]['lines'] == ['  two:', '    …', '…', '…', '    command: [sh]']
-    assert 'secret' not in json.dumps(data)

@@ -166,21 +166,6 @@ def test_all_ends_with_another_type_are_marked(draw):
     assert 'topic:/x' not in marks
 
 
-def test_of_repeated_nodes_only_those_meant_are_marked(draw):
-    text = """
-        version: 1
-        nodes:
-          a:
-            publishers: {x1: std_msgs/msg/String}
-            timers: {t: {rate: 1, publish: x1, message: hello}}
-          "b_{{ i }}":
-            foreach: {i: [1, 2]}
-            subscriptions: {"x{{ i }}": {type: std_msgs/msg/String, publish: y}}
-            publishers: {y: {type: std_msgs/msg/String, external: true}}
-    """
-    assert marked(describe_picture(draw(text))) == {'topic:/x2': ['no-publisher']}
-
-
 def test_what_is_wrong_with_a_behaviour_marks_its_node(draw):
     text = """
         version: 1
@@ -246,12 +231,6 @@ def test_ends_that_processes_declare_are_drawn_and_marked(draw):
     assert marked(document)['publisher:robot/speaker:words'] == ['conflicting-types']
 
 
-def test_two_nodes_of_one_name_are_two(draw):
-    text = 'version: 1\nnodes: {/a/n: {}, n: {namespace: /a}}\n'
-    ids = [node['id'] for node in describe_picture(draw(text))['nodes']]
-    assert ids == ['node:/a/n', "node:/a/n'"]
-
-
 def test_external_ends_of_either_side(external_ends):
     channels = by_id(describe_picture(external_ends), 'channels')
     assert {key: each['external'] for key, each in channels.items()} == {
@@ -259,18 +238,6 @@ def test_external_ends_of_either_side(external_ends):
         'topic:/y': ('providers',),
         'service:/add': ('providers',),
     }
-
-
-def test_qos_that_says_the_default_does_not_differ(draw):
-    qos = '{reliability: reliable, depth: 10, deadline: infinite}'
-    edges = describe_picture(draw(TALKER.replace('sensor_data', qos)))['edges']
-    assert edges[0]['qos'] == {}
-
-
-def test_what_a_setting_says_lies_in_no_file(draw):
-    setting = 'nodes.ear.publishers={late: {type: std_msgs/msg/String, external: true}}  # a//b'
-    edges = by_id(describe_picture(draw(TALKER, setting)), 'edges')
-    assert edges['publisher:/ear:late']['file'] == f'--set {setting}'
 
 
 @pytest.mark.parametrize('format_name', ['mermaid', 'dot', 'json'])

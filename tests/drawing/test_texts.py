@@ -10,7 +10,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from composer.drawing import render_picture
-from composer.drawing.graphviz import lay_out
 from composer.errors import ComposerError
 from composer.yaml_text.writer import render_yaml
 
@@ -88,13 +87,6 @@ def test_clients_and_servers_elsewhere_stand_on_their_side(external_ends):
     ]
 
 
-def test_of_many_findings_the_rest_is_counted(draw):
-    text = 'version: 1\nnodes: {n: {a: 1, b: 2, c: 3, d: 4}}\n'
-    label = render_picture(draw(text), 'mermaid').splitlines()[1]
-    assert label.count('error:') == 2
-    assert label.endswith('<br/>and 2 more"]):::error')
-
-
 def with_name(text):
     """Return a system with a node, a process, a description and a type of this text."""
     data = {
@@ -134,10 +126,6 @@ def test_any_name_stays_text_in_dot_and_mermaid(draw, text):
             ET.fromstring(f'<label>{label}</label>')
 
 
-def test_the_name_of_a_file_is_text_in_dot(draw):
-    assert render_picture(draw(SYSTEM, name='a"b\\'), 'dot').startswith('digraph "a\\"b\\\\" {\n')
-
-
 def test_svg_is_xml_with_the_names_as_they_are(draw, needs_graphviz):
     root = ET.fromstring(render_picture(draw(with_name(EVIL)), 'svg'))
     texts = [each.text or '' for each in root.iter('{http://www.w3.org/2000/svg}text')]
@@ -173,17 +161,6 @@ def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):
     with pytest.raises(ComposerError, match='laid out by Graphviz, which is not') as caught:
         render_picture(draw(SYSTEM), 'svg')
     assert "pip install 'rclpy-composer[graph]'" in caught.value.help
-
-
-def test_a_failure_of_graphviz_is_told(draw, monkeypatch, tmp_path):
-    program = tmp_path / 'dot'
-    program.write_text(
-        '#!/bin/sh\necho "<svg></svg>"; echo "Warning: no" >&2; echo "out of paper" >&2; exit 3\n'
-    )
-    program.chmod(0o755)
-    monkeypatch.setenv('PATH', str(tmp_path), prepend=':')
-    with pytest.raises(ComposerError, match='Graphviz failed with code 3: out of paper'):
-        lay_out('digraph {}')
 
 
 PLACED = """

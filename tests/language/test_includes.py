@@ -143,14 +143,6 @@ def test_includes_are_repeated_and_left_out(write):
     assert full_names(system) == ['/robot_0/n', '/robot_1/n']
 
 
-def test_paths_are_relative_to_the_file_that_includes(write, tmp_path):
-    (tmp_path / 'deep').mkdir()
-    (tmp_path / 'deep' / 'mid.yaml').write_text(robot('{file: leaf.yaml}'))
-    (tmp_path / 'deep' / 'leaf.yaml').write_text('version: 1\nnodes: {leaf: {}}')
-    system = load_system(write(robot=robot('{file: deep/mid.yaml}')))
-    assert full_names(system) == ['//leaf']
-
-
 def test_a_finding_in_the_deepest_file_comes_with_the_chain_of_includes(write):
     path = write(
         leaf='version: 1\nnodes: {leaf: {log_levl: debug}}',
@@ -192,13 +184,6 @@ def test_what_is_wrong_with_an_include_is_said_at_its_place(write, include, expe
     assert finding == expected
 
 
-def test_a_cycle_over_two_files_names_the_way(write):
-    path = write(a=robot('{file: robot.yaml}'), robot=robot('{file: a.yaml}'))
-    (finding,) = load_system(path).diagnostics
-    assert (finding.rule, str(finding.span)) == ('include-cycle', 'a.yaml:3:16')
-    assert [str(each.span) for each in finding.related] == ['robot.yaml:3:16']
-
-
 # Includes in includes
 
 MIDDLE = """
@@ -238,28 +223,6 @@ def test_the_profiles_of_one_file_are_not_those_of_another(write, who):
     )
     assert finding.span.source.name == f'{who}.yaml'
     assert len(finding.related) == (who == 'leaf')
-
-
-def test_a_node_that_is_left_out_takes_no_name(write):
-    path = write(
-        leaf='version: 1\nnodes: {lidar: {log_level: info}}\n',
-        robot=robot('{file: leaf.yaml}', 'nodes: {lidar: {when: false}}'),
-    )
-    system = load_system(path)
-    assert not system.diagnostics
-    assert [node.log_level for node in system.spec.nodes.values()] == ['info']
-
-
-def test_what_is_ignored_may_hold_variables_of_foreach(write):
-    text = """
-    version: 1
-    x-wheel: &wheel {parameters: {index: "{{ i }}"}}
-    nodes:
-      "wheel_{{ i }}": {<<: *wheel, foreach: {i: [1, 2]}}
-    """
-    system = load_system(write(robot=text))
-    assert not system.diagnostics
-    assert [each.parameters['index'].value for each in system.spec.nodes.values()] == [1, 2]
 
 
 def test_variables_of_the_environment_are_those_of_the_file_that_is_started(write):
@@ -348,32 +311,6 @@ processes:
     assert [*system.data['nodes']] == [*system.data['processes']] == ['camera']
 
 
-@pytest.mark.parametrize('file', ['package://no_such/x.yaml', '"{{ ip }}.yaml"'])
-def test_what_is_left_out_may_be_in_a_package_of_other_machines(write, file):
-    path = write(
-        robot=f"version: 1\nargs: {{ip: ''}}\n"
-        f'include: {{x: {{file: {file}, when: false}}}}\nnodes: {{}}\n'
-    )
-    assert not load_system(path).diagnostics
-
-
-def test_values_that_hang_on_arguments_are_samples_where_an_include_is_left_out(write):
-    part = """
-    version: 1
-    args: {ip: {type: string, choices: [a, b]}, rate: {type: double}}
-    nodes: {n: {timers: {t: {period: "{{ 1 / rate }}", behaviour: 'parts:tick'}}}}
-    """
-    robot = """
-    version: 1
-    args: {ip: '', rate: 0.0}
-    include:
-      x: {file: part.yaml, when: "{{ ip != '' }}", args: {ip: "{{ ip }}", rate: "{{ rate }}"}}
-      y: {file: part.yaml, when: false, args: {ip: c, rate: 1.0}}
-    """
-    (finding,) = load_system(write(part=part, robot=robot)).diagnostics
-    assert (finding.rule, str(finding.span)) == ('argument-type', 'robot.yaml:5:48')
-
-
 @pytest.mark.parametrize('namespace', ['left arm', '9lives', '/a//b', 'a-b', '/left/'])
 def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespace):
     path = write(
@@ -384,20 +321,3 @@ def test_a_namespace_that_ros_refuses_is_said_at_the_include_once(write, namespa
     assert message.startswith(f"'{namespace}': ")
     findings_of_nodes = check_system(load_system(path), InterfaceCatalogue([]))
     assert [each.rule for each in findings_of_nodes if each.rule == 'bad-name'] == ['bad-name']
-
-
-def test_what_is_wrong_with_a_file_included_twice_is_left_out_of_both(write):
-    part = 'version: 1\nnodes: {camera: {timers: [a], publishers: {image: {tpye: a/msg/B}}}}\n'
-    path = write(
-        part=part,
-        robot='version: 1\ninclude:\n  a: {file: part.yaml, namespace: a}\n'
-        '  b: {file: part.yaml, namespace: b}\n',
-    )
-    system = load_system(path)
-    assert {path for path in system.dropped if path[-1] == 'timers'} == {
-        ('nodes', 'camera', 'timers'),
-        ('nodes', '/b/camera', 'timers'),
-    }
-    for node in ('camera', '/b/camera'):
-        span = system.positions.key(('nodes', node, 'publishers', 'image', 'type'))
-        assert (span.line, span.text) == (2, 'tpye')

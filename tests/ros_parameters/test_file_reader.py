@@ -83,12 +83,6 @@ def test_a_value_knows_its_place():
     assert [span.text for span in entry.spans] == ['1', '22']
 
 
-@pytest.mark.parametrize('text', ['', '# nothing\n', '/**: {}\n', '/**: {ros__parameters: {}}\n'])
-def test_a_file_may_hold_nothing(text):
-    file = parse_parameter_file(text, 'p.yaml')
-    assert (file.entries, file.findings) == ((), ())
-
-
 FAULTS = {
     'a: 1': ("1:4 this value has no 'ros__parameters' above it"),
     'a:\n  ros_parameters: {b: 1}': "2:3 'ros_parameters' is not a key of parameter files",
@@ -181,11 +175,6 @@ def test_the_last_name_that_matches_wins_however_special_it_is():
     assert values_of(special + wild) == {'a': 2}
     assert values_of(wild + special) == {'a': 1}
     assert values_of(wild + special, wild.replace('2', '3')) == {'a': 1}
-
-
-def test_of_two_types_the_one_counts_that_comes_first():
-    for text in ('/**: {ros__parameters: {a: 1, a: x}}', '/**: {ros__parameters: {a: x, a: 1}}'):
-        assert values_of(text) == {'a': 1}
 
 
 def test_parameters_of_the_command_line_have_the_types_of_files():

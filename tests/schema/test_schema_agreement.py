@@ -228,14 +228,6 @@ def test_what_json_does_not_have_has_one_verdict(validator, node, is_valid):
     assert is_valid or not validator.is_surely_valid(data)
 
 
-@pytest.mark.parametrize('validator', [QUICK, ALONE], ids=['quick', 'alone'])
-@pytest.mark.parametrize('name', ['', ' ', '\x1c', '\x85', '\xa0', '\u3000'])
-def test_names_of_white_space_are_empty(validator, name):
-    data = {'version': 1, 'nodes': {}, 'qos': {name: {'depth': 1}}}
-    assert not validator.is_surely_valid(data)
-    assert [error.validator for error in validator.iter_errors(data)] == ['pattern']
-
-
 def test_findings_are_the_same_without_jsonschema_rs(monkeypatch):
     files = sorted(Path(composer.__file__).parent.glob('rules/*/bad.yaml'))[::3]
 

@@ -252,32 +252,6 @@ def test_a_finding_in_a_merged_mapping_is_placed_where_it_is_written():
     assert findings(text) == [('wrong-type', "expected a number, got 'slow'", '2:24', None)]
 
 
-@pytest.mark.parametrize(
-    ('timer', 'place'),
-    [
-        ('{<<: *slow, rate: 1}', '5:15'),
-        ('{rate: 1, <<: *slow}', '5:4'),
-        ('{<<: [*slow, *fast]}', '5:3'),
-    ],
-)
-def test_a_conflict_with_a_merged_key_is_placed_where_it_is_merged_in(timer, place):
-    text = f"""{HEAD}x-slow: &slow {{period: 2, behaviour: a:b}}
-x-fast: &fast {{rate: 2}}
-nodes: {{rover: {{timers: {{tick:
-  {timer}}}}}}}
-"""
-    (finding,) = load_system_text(text).diagnostics
-    assert finding.rule == 'conflicting-keys'
-    assert f'{finding.span.line}:{finding.span.column}' == place
-    assert finding.related[0].message == 'merged in from here'
-    assert finding.related[0].span.line == 2
-
-
-def test_long_values_are_shown_short():
-    ((_, message, _),) = node_findings(f'{{use_sim_time: {"x" * 500}}}')
-    assert message == f"expected true or false, got '{'x' * 38}…"
-
-
 def test_a_misspelt_key_is_read_as_the_right_one():
     loaded = load_system_text(
         HEAD + 'nods:\n  rover:\n    timer:\n      tick: {perod: 2, behavior: a:b}\n',
@@ -345,18 +319,6 @@ def test_a_type_in_the_form_of_other_places_is_understood(text, meant):
 def test_a_behaviour_in_another_form_is_understood(text, meant):
     ((_, _, help_text),) = node_findings(f'{{on_start: {{behaviour: "{text}"}}}}')
     assert help_text == (meant and f"did you mean '{meant}'?")
-
-
-def test_a_finding_in_an_item_of_a_list_is_left_out_alone():
-    text = '{wait_for: [{topic: a, timeout: 0}, {node: [b]}, {service: c, tiemout: 1}]}'
-    assert [rule for rule, *_ in node_findings(text)] == [
-        'unknown-key',
-        'out-of-range',
-        'wrong-type',
-    ]
-    system = load_system_text(f'{HEAD}nodes: {{rover: {text}}}')
-    conditions = system.spec.nodes['rover'].wait_for
-    assert [each.kind for each in conditions] == ['topic', 'topic', 'service']
 
 
 def test_misspelt_keys_that_count_before_the_schema_are_one_finding_each():

@@ -7,8 +7,6 @@ import sys
 
 import pytest
 
-from tests.running import ROOT
-
 pytest.importorskip('rclpy')
 pytest.importorskip('test_msgs')
 pytestmark = pytest.mark.ros
@@ -145,14 +143,3 @@ def test_idioms_that_depend_on_addresses_and_real_time_are_the_same(tmp_path):
         here, tmp_path / 'there', ['hard.scenario.yaml'], '--shuffle', '2'
     )
     assert sum('# ' in line for line in trace if line.startswith('#')) == 3
-
-
-@pytest.mark.long
-def test_shipped_systems_are_the_same(tmp_path, interface_cache):
-    here = tmp_path / 'here'
-    here.mkdir()
-    for name in ('behaviours', 'configs', 'interfaces', 'tests/systems'):
-        shutil.copytree(ROOT / name, here / name)
-    names = ('patrol', 'warehouse')
-    words = [f'tests/systems/{name}.scenario.yaml' for name in names]
-    check_that_they_are_the_same(here, tmp_path / 'there', words)

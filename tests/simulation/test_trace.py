@@ -99,25 +99,3 @@ def test_messages_have_all_their_fields():
         '{header: {stamp: {sec: 0, nanosec: 0}, frame_id: ""}, name: ["a"], '
         'position: [1.0, .nan], velocity: [], effort: []}'
     )
-
-
-@pytest.mark.ros
-def test_floats_of_32_bits_have_their_own_digits():
-    from sensor_msgs.msg import LaserScan
-    from std_msgs.msg import Float32
-
-    assert render_value(Float32(data=0.1)) == '{data: 0.1}'
-    assert render_value(Float32(data=math.pi)) == '{data: 3.1415927}'
-    scan = LaserScan(ranges=[0.2, 1.0, math.nan, math.inf, 1e-5, 3.4e38])
-    assert 'ranges: [0.2, 1.0, .nan, .inf, 1e-05, 3.4e+38],' in render_value(scan)
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize('count', [64, 65])
-def test_arrays_of_bytes_are_one_text_if_they_are_long(count):
-    from std_msgs.msg import ByteMultiArray, UInt8MultiArray
-
-    bytes_ = render_value(ByteMultiArray(data=[b'\x01'] * count))
-    numbers = render_value(UInt8MultiArray(data=[1] * count))
-    assert bytes_ == numbers
-    assert ('!!binary' in bytes_) == (count > 64)

@@ -62,26 +62,6 @@ def test_right_programs_are_not_reported(file, monkeypatch):
     assert [str(each.span) for each in find_by_types(Path(file.name))] == []
 
 
-def test_functions_take_the_nodes_of_all_that_call_them(typed):
-    (typed / 'shared.py').write_text(
-        'def warn(node):\n    node.logger.warning("low")\n\n\n'
-        'def one(node):\n    warn(node)\n\n\n'
-        'class Other:\n'
-        '    def two(self, node):\n        self.judge(node)\n\n'
-        '    def judge(self, node):\n        warn(node)\n        node.publish("out", 1.5)\n'
-    )
-    (typed / 'shared.yaml').write_text(
-        'version: 1\nnodes:\n'
-        '  first: {timers: {t: {rate: 1, behaviour: shared:one}}}\n'
-        '  second:\n'
-        '    publishers: {out: {type: std_msgs/msg/String, external: true}}\n'
-        '    timers: {t: {rate: 1, behaviour: shared:Other.two}}\n'
-    )
-    assert [(each.rule, each.span.line) for each in find_by_types(Path('shared.yaml'))] == [
-        ('field-type', 15)
-    ]
-
-
 def test_what_two_checks_find_is_said_once(typed, capsys):
     (typed / 'scaling.py').write_text(
         'from geometry_msgs.msg import Vector3\n\n\n'

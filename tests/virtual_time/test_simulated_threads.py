@@ -7,18 +7,15 @@ import sys
 import threading
 import time
 import traceback
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from composer.virtual_time.originals import REAL
-from composer.virtual_time.simulated_thread import SimulatedThread
 from composer.virtual_time.simulated_threads import NothingHappensError
-from composer.virtual_time.stuck_threads import SimulationStuckError, StuckWatch
+from composer.virtual_time.stuck_threads import SimulationStuckError
 from tests.virtual_time.virtual_runs import virtual_time
 
 
@@ -197,35 +194,6 @@ def test_one_that_was_given_up_does_no_more_harm():
     assert seen == ['other']
 
 
-def test_one_that_ends_while_it_is_looked_at_is_not_stuck(wait_for):
-    ended = SimulatedThread()
-
-    def work():
-        ended.ident, ended.native = threading.get_ident(), threading.get_native_id()
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    # What Python joins has not ended in the system yet.
-    wait_for(lambda: not Path(f'/proc/self/task/{ended.native}').exists(), 'its end')
-    watch = StuckWatch(limit_sec=60.0)
-    watch.begin('turn', ended)
-    assert not watch.is_stuck('turn', ended)
-
-
-def test_an_error_in_a_thread_is_its_own(capsys, monkeypatch):
-    monkeypatch.setattr(threading, 'excepthook', lambda args: print(repr(args.exc_value)))
-
-    def fail():
-        time.sleep(1)
-        raise ValueError
-
-    with virtual_time():
-        thread = threading.Thread(target=fail)
-        thread.start()
-        thread.join()
-    assert capsys.readouterr().out == 'ValueError()\n'
-
-
 def _waits_for_ever():
     threading.Event().wait()
 
@@ -303,32 +271,6 @@ def test_no_thread_is_left_at_the_end(function, seed):
     assert time.monotonic() - begun < 5
 
 
-def test_nobody_hears_of_the_end_of_a_pool(caplog):
-    with virtual_time():
-        pool = ThreadPoolExecutor(2)
-        assert pool.submit(abs, -1).result() == 1
-    assert caplog.records == []
-
-
-def test_one_that_has_not_begun_never_does():
-    seen = []
-    with virtual_time():
-        _thread.start_new_thread(seen.append, (1,))
-    assert seen == []
-
-
-def test_many_simulations_follow_each_other():
-    before = threading.active_count()
-    for _ in range(10):
-        with virtual_time() as threads:
-            ended = threading.Event()
-            threading.Timer(100, ended.set).start()
-            threading.Thread(target=_waits_for_ever).start()
-            ended.wait()
-            assert threads.now_ns == 100_000_000_000
-    assert threading.active_count() == before
-
-
 def test_a_forked_process_has_real_time():
     with virtual_time():
         thread = threading.Thread(target=_sleeps_long)
@@ -362,18 +304,3 @@ def test_chance_is_the_seed():
     assert run(1) == run(1)
     for one, other in zip(run(1), run(2), strict=True):
         assert one != other
-
-
-def test_a_real_clock_is_refused_while_the_next_turn_is_looked_for():
-    with virtual_time() as threads:
-        before = dict(threads.by_ident)
-
-        def look():
-            threads.by_ident.clear()
-            try:
-                time.monotonic()
-            finally:
-                threads.by_ident.update(before)
-
-        with pytest.raises(RuntimeError, match='looked for in real time'):
-            threads.wait_until(look, 1)

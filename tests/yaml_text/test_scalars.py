@@ -70,13 +70,6 @@ def test_an_endless_number_is_refused(digits):
         parse_plain_scalar(digits)
 
 
-@pytest.mark.parametrize('digits', ['9' * 250, '0x' + 'f' * 248, '0o' + '7' * 248])
-def test_the_longest_number_is_still_a_double(digits):
-    value = parse_plain_scalar(digits)
-    assert math.isfinite(float(value))
-    assert str(value)
-
-
 @pytest.mark.parametrize(
     ('text', 'tag', 'value'),
     [

@@ -255,64 +255,6 @@ def test_what_may_be_right_has_no_finding(check, line):
     assert found == []
 
 
-ANSWERS = """
-  rover:
-    parameters: {speed: 1.0}
-    actions:
-      drive: {type: test_msgs/action/Fibonacci, behaviour: parts:drive, accept: parts:accept}
-    on_parameters: parts:on_parameters
-"""
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('answer', 'are_wrong'),
-    [
-        ('{"successful": True}', (True, True)),
-        ('True', (False, True)),
-        ('None', (False, False)),
-        ('"too fast" if node.parameters.speed else None', (False, False)),
-    ],
-)
-def test_an_answer_says_whether_or_why_not(check, answer, are_wrong):
-    code = f"""
-        def accept(node, goal):
-            return {answer}
-        def on_parameters(node, changes):
-            return {answer}
-        def drive(node, goal):
-            return {{}}
-        """
-    found = [(3, 'bad-answer'), (5, 'bad-answer')]
-    wanted = [each for each, is_wrong in zip(found, are_wrong, strict=True) if is_wrong]
-    assert check(ANSWERS, code) == wanted
-
-
-UNPUBLISHED = """
-  rover:
-    publishers: {level: {type: std_msgs/msg/UInt8, external: true}}
-    timers:
-      tick: {period: 1.0, behaviour: parts:tick}
-      send: {period: 1.0, behaviour: parts:send, publish: level}
-"""
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('code', 'found'),
-    [
-        ('def tick(node):\n    return {"data": 1}\n', [(2, 'no-effect')]),
-        ('def tick(node):\n    yield {"data": 1}\n', [(2, 'no-effect')]),
-        ('def tick(node):\n    return 1\n', []),
-        ('def tick(node):\n    return {"data": 1}\n\n\nprint(tick)\n', []),
-        ('def tick(node):\n    return {"data": 1}\n\n\nsend = tick\n', []),
-    ],
-)
-def test_a_payload_is_for_something(check, code, found):
-    other = '' if 'send' in code else '\n\ndef send(node):\n    return 1\n'
-    assert check(UNPUBLISHED, code + other) == found
-
-
 def test_a_comment_in_python_silences_a_finding(check):
     code = f'{USE_ALL}\ndef hear(node, m):\n    use(node)\n    print(nobody)  # composer: ignore[undefined-name]\n'
     assert check(SYSTEM, code, installed=False) == []

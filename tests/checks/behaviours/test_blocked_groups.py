@@ -132,17 +132,6 @@ def test_on_start_waits_for_nothing_that_runs_after_it(check, wait):
     assert [rule for _, rule in check_body(check, wait, nodes)] == ['blocked-group']
 
 
-def test_behaviours_of_other_nodes_run_during_an_on_start_that_waited(check):
-    first, rest = SYSTEM.split('    timers:')
-    del rest
-    nodes = f"""{first}
-  late:
-    on_start: parts:tick
-"""
-    assert len(check_body(check, 'GO.wait()', nodes)) == 1
-    assert check_body(check, 'GO.wait()', f'{nodes}    wait_for: {{topic: go}}\n') == []
-
-
 @pytest.mark.parametrize('value', ['60', 'null'])
 def test_who_says_that_a_behaviour_may_take_long_is_believed(check, value):
     nodes = SYSTEM.replace('period: 1', f'warn_after: {value}, period: 1')

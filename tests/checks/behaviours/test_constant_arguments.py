@@ -66,41 +66,6 @@ def test_the_monitor_says_what_it_takes(check, behaviour, wrong, wanted):
     assert any(f'takes {wanted}' in each for each in messages)
 
 
-@pytest.mark.parametrize(
-    ('topic', 'more', 'is_found'),
-    [
-        ('scan', '', False),
-        ('scna', '', True),
-        ('image', '', True),
-        ('scna', 'on_start: parts:start', True),
-        ('scna', 'on_start: parts:count_all', False),
-        ('scna', 'on_start: 3', False),
-        ('"{{ topic }}"', '', False),
-    ],
-)
-def test_what_is_watched_is_counted(check, topic, more, is_found):
-    nodes = f"""
-  n:
-    subscriptions:
-      in:
-        type: std_msgs/msg/String
-        external: true
-        behaviour: behaviours.monitor:count
-        with: {{topic: scan}}
-    timers: {{t: {{period: 1, behaviour: behaviours.monitor:watch, with: {{topic: {topic}}}}}}}
-    {more}
-"""
-    before = 'args: {topic: {type: string}}\n'
-    start = 'def start(node): ...'
-    code = (
-        'from behaviours.monitor import count\ndef count_all(node): ...'
-        if 'all' in more
-        else start
-    )
-    found = check(nodes, code, before=before, rule='bad-argument')
-    assert found == ["nothing in node 'n' counts the messages of '" + topic + "'"] * is_found
-
-
 @pytest.mark.ros
 @pytest.mark.parametrize('behaviour', ['relay', 'throttle', 'drop', 'mux'])
 def test_a_message_is_passed_on_to_its_own_type(check, behaviour):
@@ -111,25 +76,6 @@ def test_a_message_is_passed_on_to_its_own_type(check, behaviour):
     assert check(nodes_of(name, given, 'std_msgs/msg/Int32'), rule=rule) == [
         "a std_msgs/msg/String cannot be passed on to 'out', which publishes std_msgs/msg/Int32"
     ]
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
-    ('body', 'is_passed_on'),
-    [
-        ('return message', True),
-        ('if message.data:\n        return message', True),
-        ('return None if node.name else message', True),
-        ('return message.data', False),
-        ('message = convert(message)\n    return message', False),
-        ('def inner():\n        return message\n    return inner', False),
-        ('return convert(message)', False),
-    ],
-)
-def test_what_a_behaviour_of_ones_own_passes_on_is_known(check, body, is_passed_on):
-    code = f'def pass_on(node, message):\n    {body}\n'
-    nodes = nodes_of('parts:pass_on', '{}', 'std_msgs/msg/Int32')
-    assert len(check(nodes, code, rule='type-mismatch')) == is_passed_on
 
 
 @pytest.mark.parametrize(
@@ -182,15 +128,3 @@ def test_what_takes_no_node_is_no_behaviour(check, behaviour, rule):
     """
     nodes = f'  n: {{on_start: "{behaviour}"}}\n'
     assert check(nodes, code) == ([(3, rule)] if rule else [])
-
-
-@pytest.mark.parametrize('patch', ['sys.modules[__name__].run = see', 'globals()["run"] = see'])
-def test_what_a_module_may_replace_is_left_to_it(check, patch):
-    code = f'import sys\ndef turn(node, angle): ...\ndef see(node): ...\nrun = turn\n{patch}\n'
-    assert check('  n: {on_start: "parts:run"}\n', code) == []
-
-
-def test_an_argument_with_an_error_of_its_own_is_not_missed_again(check):
-    nodes = '  n: {on_start: {behaviour: "parts:run", with: {angle: "{{ nobody }}"}}}\n'
-    code = 'def turn(node, angle): ...\nrun = turn\n'
-    assert 'bad-signature' not in [rule for _, rule in check(nodes, code)]

@@ -1,6 +1,5 @@
 """Imports of what there is not are found where they stand, and no others."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
@@ -57,30 +56,6 @@ def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
     assert check(NODES, code + GO, before=before, rule=RULE) == []
 
 
-# Modules that fill themselves, and what fills them beside that.
-FILLED = [
-    ("globals().update({n: n.lower() for n in ('first', 'last')})", ''),
-    ('def __getattr__(name): return name', ''),
-    ('from re import *', ''),
-    ("import sys\nsetattr(sys.modules[__name__], 'fir' + 'st', 1)", ''),
-    ("def fill(): globals().setdefault('first', 1)\nfill()", ''),
-    ('exec("first = 1")', ''),
-    ('last = 1', 'setattr(filled, "first", 1)'),
-    ('last = 1', 'vars(filled).update(first=1)'),
-]
-
-
-@pytest.mark.usefixtures('project')
-@pytest.mark.parametrize(('filled', 'filling'), FILLED)
-def test_a_module_that_fills_itself_may_have_any_name(check, filled, filling):
-    Path('filled.py').write_text(f'{filled}\n')
-    code = f'import filled\n{filling}\ndef go(node): print(filled.first)\n'
-    assert check(NODES, code) == []
-    if not filling:
-        assert check(NODES, f'from filled import first{GO}', rule=RULE) == []
-        assert check('  n: {on_start: filled:first}\n', code, rule='unknown-behaviour') == []
-
-
 @pytest.mark.usefixtures('project')
 @pytest.mark.parametrize(
     ('code', 'message'),
@@ -102,21 +77,6 @@ def test_what_cannot_be_imported_is_found(check, code, message):
     assert check(NODES, code + GO, rule=RULE) == [message]
 
 
-@pytest.mark.usefixtures('project')
-def test_what_a_behaviour_imports_first_is_looked_at(check):
-    code = """
-        def go(node):
-            '''Go.'''
-            start = node.now()
-            import not_there
-            if not_there.is_here:
-                return
-            import neither
-    """
-    assert check(NODES, code) == [(5, RULE)]
-    assert check('  n: {on_stop: parts:o}\n', code + '    def o(node): ...', rule=RULE) == []
-
-
 @pytest.mark.ros
 @pytest.mark.usefixtures('project')
 @pytest.mark.parametrize(
@@ -136,11 +96,3 @@ def test_types_are_imported_from_where_they_are(check, code, message):
     before = 'interfaces: {declared: declared}\n'
     found = check(NODES, code + GO, before=before, rule=RULE)
     assert found == ([message] if message else [])
-
-
-@pytest.mark.usefixtures('project')
-def test_installed_packages_may_be_missing_where_there_is_no_ros(check, monkeypatch):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: name != 'rclpy' and find(name))
-    code = 'import not_there\nfrom package import iner' + GO
-    assert check(NODES, code, rule=RULE) == ["package has no 'iner'"]

@@ -141,19 +141,3 @@ def test_what_may_work_has_no_finding(fields):
 def test_constants_are_known_by_their_names(name, help_text):
     found = findings(f'header.stamp.sec: message.{name}', 'sensor_msgs/msg/NavSatStatus')
     assert [each[3] for each in found] == [help_text] * (help_text is not None)
-
-
-def test_fields_of_items_of_arrays_are_known():
-    field = 'twist.linear.x: transforms[0].trnsform.translation.x'
-    heard = 'geometry_msgs/msg/PoseArray'
-    ((rule, part, *_),) = findings('twist.linear.x: poses[0].positon.x', heard)
-    assert (rule, part) == ('unknown-field', 'positon')
-    assert [rule for rule, *_ in findings(field, heard)] == ['undefined-name']
-
-
-def test_a_module_of_the_same_name_is_none_of_ours(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / 'behaviours').mkdir()
-    code = 'def transform(node, message, fields):\n    return None\n'
-    (tmp_path / 'behaviours' / 'topics.py').write_text(code)
-    assert findings('x: y +') == []

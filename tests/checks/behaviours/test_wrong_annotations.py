@@ -125,31 +125,6 @@ def test_what_is_returned_makes_the_message(check, published, annotation, is_rig
 
 
 @pytest.mark.ros
-def test_a_message_may_be_the_sole_field_of_another(check):
-    nodes = """
-  a:
-    publishers: {out: {type: test_msgs/msg/Nested, external: true}}
-    timers: {tick: {period: 1, behaviour: parts:tick, publish: out}}
-"""
-    code = 'from test_msgs.msg import BasicTypes\ndef tick(node) -> BasicTypes: ...\n'
-    assert check(nodes, code) == []
-
-
-@pytest.mark.ros
-def test_types_of_one_name_are_the_same_if_they_have_the_same_fields(check, tmp_path):
-    folder = tmp_path / 'own_msgs' / 'msg'
-    folder.mkdir(parents=True)
-    (folder / 'String.msg').write_text('string data\n')
-    (folder / 'Int32.msg').write_text('int64 data\n')
-    code = 'from own_msgs.msg import Int32, String\n\ndef hear(node, message: {}): ...\n'
-    before = 'interfaces: {own_msgs: own_msgs}\n'
-    assert check(LISTENER, code.format('String'), before=before) == []
-    other = LISTENER.replace('msg/String', 'msg/Int32')
-    found = check(other, code.format('Int32'), before=before)
-    assert [rule for _, rule in found] == ['wrong-annotation']
-
-
-@pytest.mark.ros
 def test_an_action_is_annotated_with_its_parts(check):
     nodes = """
   a:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from composer.checks.connections import topology, unconnected
+from composer.checks.connections import topology
 
 TALK = 'timers: {a: {period: 1, publish: out, message: hello}}'
 HEAR = 'behaviour: parts:hear'
@@ -187,18 +187,6 @@ def test_a_deadline_is_kept_where_something_may_publish_in_time(check, old, new)
     assert check(text.replace(old, new), code, before=before, rule=rule) == []
 
 
-def test_a_deadline_is_compared_with_all_timers_of_a_publisher(check):
-    assert check(DEADLINE) == [(4, 'missed-deadline')]
-    two = DEADLINE + '      two: {period: 2, publish: out, message: hello}\n'
-    assert check(two, rule='missed-deadline') == [
-        "publisher 'out' promises a message every 0.5 s, and its timers publish one every "
-        '0.666667 s'
-    ]
-    profile = 'qos: {fast: {deadline: 0.5}}\n'
-    nodes = DEADLINE.replace('{deadline: 0.5}', 'fast')
-    assert check(nodes, before=profile) == [(5, 'missed-deadline')]
-
-
 @pytest.mark.parametrize(
     ('args', 'nodes', 'is_left'),
     [
@@ -236,39 +224,6 @@ def test_the_other_end_may_be_external(check):
     ]
 
 
-def test_names_in_many_namespaces_are_compared_within_a_limit(check, monkeypatch):
-    compared = []
-    count_edits = unconnected.count_edits
-    monkeypatch.setattr(
-        unconnected, 'count_edits', lambda *words: compared.append(words) or count_edits(*words)
-    )
-    nodes = f"""
-  'n{{{{ i }}}}':
-    foreach: {{i: '{{{{ range(100) }}}}'}}
-    publishers: {{p: std_msgs/msg/String}}
-    timers: {{t: {{period: 1, publish: p, message: x}}}}
-    subscriptions:
-      s: {{type: std_msgs/msg/String, topic: '/n{{{{ i }}}}/p', external: true, {HEAR}}}
-"""
-    assert len(check(nodes, CODE)) == 1
-    assert 0 < len(compared) <= unconnected._MOST_COMPARED
-
-
-def test_a_name_that_the_command_line_decides_meets_anything(check):
-    before = 'args: {topic: {type: string}}\n'
-    nodes = meeting('', '').replace('topic: heard', 'topic: "{{ topic }}"')
-    assert check(nodes, CODE, before=before) == []
-
-
-def test_a_name_with_a_finding_meets_anything(check):
-    nodes = meeting('', '').replace('topic: heard', 'topic: 3')
-    assert [rule for _, rule in check(nodes, CODE)] == ['wrong-type']
-    nodes = meeting('', '').replace('publishers: {', 'publishers: 3 # {')
-    assert 'no-publisher' not in [rule for _, rule in check(nodes, CODE)]
-    nodes = meeting('', '').replace('publishers:', 'senders:')
-    assert 'no-publisher' not in [rule for _, rule in check(nodes, CODE)]
-
-
 def test_the_odd_one_out_has_the_wrong_type(check):
     nodes = """
   a:
@@ -299,15 +254,6 @@ def test_one_finding_stands_for_all_ends_of_the_same_qos(check):
 {inputs}
 """
     assert check(nodes, CODE) == [(4, 'incompatible-qos')]
-
-
-def test_qos_that_is_not_known_is_compatible(check):
-    nodes = meeting('', 'remap: {heard: chatter}')
-    for qos in ('no_profile', '{reliability: besteffort}'):
-        text = nodes.replace('topic: chatter', f'topic: chatter, qos: {qos}')
-        assert 'incompatible-qos' not in [rule for _, rule in check(text, CODE)]
-    text = nodes.replace('topic: chatter', 'topic: chatter, qos: {reliability: "{{ how }}"}')
-    assert check(text, CODE, before='args: {how: {type: string}}\n') == []
 
 
 @pytest.mark.parametrize(
@@ -362,13 +308,3 @@ def test_a_chain_of_relays_is_no_loop(check):
       b: {type: std_msgs/msg/String, publish: c}
 """
     assert check(nodes) == []
-
-
-@pytest.mark.parametrize(('length', 'is_right'), [(226, True), (227, False)])
-def test_an_action_leaves_room_for_the_names_of_its_parts(check, length, is_right):
-    name = 'a' * length
-    nodes = f"""
-  a:
-    actions: {{{name}: {{type: test_msgs/action/Fibonacci, behaviour: parts:do}}}}
-"""
-    assert (check(nodes, CODE, rule='bad-name') == []) == is_right

@@ -1,12 +1,6 @@
 """Waits that never end, and waits that only look like it."""
 
-from textwrap import dedent
-
 import pytest
-
-from composer.checks.checker import check_system
-from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.pipeline import load_system
 
 CODE = """
     import threading
@@ -144,19 +138,6 @@ GOALS = """
 
 @pytest.mark.ros
 @pytest.mark.parametrize(
-    ('rest', 'count'),
-    [
-        ('    on_start: parts:send\n', 1),
-        ('    on_stop: parts:send\n', 1),
-        ('    timers: {tick: {period: 1, behaviour: parts:wait}}\n', 0),
-    ],
-)
-def test_an_action_takes_goals_between_start_and_stop(check, rest, count):
-    assert len(check(ACTION + rest, GOALS, rule='service-deadlock')) == count
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(
     ('server', 'message'),
     [
         ('behaviour: parts:do', None),
@@ -191,30 +172,6 @@ def test_a_ring_of_services_is_found_once(check, behaviour):
     assert deadlocks(check, nodes) == [5]
     (message,) = check(nodes, CODE, rule='service-deadlock')
     assert message.endswith("none can continue: '/b/set_it' → '/c/set_it' → '/a/set_it'")
-
-
-def test_a_chain_that_ends_is_no_ring(check):
-    nodes = ring('a', 'b', 'c').replace('service: a/set_it', 'service: d/set_it')
-    nodes += (
-        '  d:\n    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}\n'
-    )
-    assert deadlocks(check, nodes) == []
-
-
-def test_two_behaviours_of_one_group_may_ask_each_others_node(check):
-    # Each may have to wait for the other's turn, but not for ever.
-    nodes = """
-  a:
-    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: b/set_it}}
-    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
-    timers: {tick: {period: 1, behaviour: parts:ask}}
-  b:
-    service_clients: {set_it: {type: std_srvs/srv/SetBool, service: c/set_it}}
-    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:relay}}
-  c:
-    services: {~/set_it: {type: std_srvs/srv/SetBool, behaviour: parts:set_it}}
-"""
-    assert deadlocks(check, nodes) == []
 
 
 @pytest.mark.parametrize(
@@ -288,36 +245,3 @@ def test_what_is_refused_does_time_out_when_it_runs(compose):
     )
     run.wait_for_line('a: CallTimeoutError')
     assert run.stop() == 0
-
-
-@pytest.mark.parametrize(
-    'body',
-    [
-        "name = 'set_it'\n            node.call(name)",
-        'node.call(NAME)',
-        "def wait():\n                node.call('set_it')\n            wait()",
-    ],
-)
-def test_a_wait_by_a_constant_or_in_a_function_inside_is_one(check, body):
-    code = f"""
-        NAME = 'set_it'
-
-        def set_it(node, request): ...
-
-        def tick(node):
-            {body}
-    """
-    timer = '    timers: {tick: {period: 1, behaviour: parts:tick}}\n'
-    assert check(ALONE + timer, code, installed=False) == [(6, 'service-deadlock')]
-
-
-def test_a_deadlock_names_the_client_beside_the_server(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / 'parts.py').write_text(dedent(CODE))
-    path = tmp_path / 'system.yaml'
-    timer = '    timers: {tick: {period: 1, behaviour: parts:ask}}\n'
-    path.write_text(f'version: 1\nnodes:{ALONE}{timer}')
-    findings = check_system(load_system(path), InterfaceCatalogue([]))
-    (finding,) = [each for each in findings if each.rule == 'service-deadlock']
-    where = [(each.span.source.name[-8:], each.span.line) for each in finding.related]
-    assert where == [('parts.py', 14), ('tem.yaml', 5), ('tem.yaml', 4)]

@@ -125,22 +125,3 @@ def test_a_slip_in_a_service_is_told(right, wrong):
     found = check((), (), [(wrong, kind)], [(right, kind), *others])
     assert [each.rule for each in found] == ['no-server']
     assert f"'/{right}'" in found[0].help
-
-
-@pytest.mark.parametrize('other', ['std_msgs/msg/String', 'sensor_msgs/msg/PointCloud2'])
-def test_another_type_is_told_in_any_case(other):
-    (finding,) = check([('scan', 'sensor_msgs/msg/LaserScan')], [('scan', other)])
-    assert finding.rule == 'conflicting-types'
-
-
-def test_what_one_node_hears_and_publishes_may_be_called_alike():
-    text = """\
-version: 1
-nodes:
-  collector:
-    subscriptions: {pose: {type: std_msgs/msg/String, behaviour: 'nodes:hear', publish: poses}}
-    publishers: {poses: std_msgs/msg/String}
-processes: {driver: {command: ['true']}}
-"""
-    findings = check_system(load_system_text(text), InterfaceCatalogue())
-    assert [each.rule for each in findings if each.rule.startswith('no-')] == []

@@ -88,19 +88,3 @@ def test_each_pair_of_different_qos_that_never_matches_is_a_finding_in_order(cha
         if (conflicts := conflicts_of(channel, here, there))
     ]
     assert found == expected
-
-
-def test_what_a_match_does_not_depend_on_is_not_compared(monkeypatch):
-    compared = []
-
-    def find(offered, requested):
-        compared.append((offered, requested))
-        return find_qos_conflicts(offered, requested)
-
-    monkeypatch.setattr(qos, 'find_qos_conflicts', find)
-    provided, used = (
-        [{'depth': depth, 'reliability': reliability} for depth in range(1, 200)]
-        for reliability in ('reliable', 'best_effort')
-    )
-    assert list(qos.check_qos_pairs(context_of('topic', provided, used))) == []
-    assert len(compared) == 1

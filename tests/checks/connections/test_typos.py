@@ -70,15 +70,6 @@ def test_what_is_waited_for_is_no_misspelt_name(check, kind, name, near):
     assert check(nodes, CODE, rule=RULE, installed=False) == ([what] if near else [])
 
 
-def test_what_is_waited_for_may_be_here_left_out_or_elsewhere(check):
-    for kind, name in (('node', 'camera'), ('topic', '/image'), ('topic', 'scan')):
-        nodes = WAITS.replace('KIND', kind).replace('NAME', name)
-        assert check(nodes, CODE, installed=False) == []
-    nodes = WAITS.replace('KIND', 'node').replace('NAME', 'camrea')
-    left_out = nodes + '  camrea: {when: false}\n'
-    assert check(left_out, CODE, installed=False) == []
-
-
 @pytest.mark.parametrize(
     ('kind', 'wrong', 'right'),
     [
@@ -139,41 +130,6 @@ def test_a_remapping_rule_is_for_no_misspelt_name(check):
 """
     assert check(nodes, installed=False) == [(4, RULE)]
     assert check(nodes.replace('imgae', 'image'), installed=False) == []
-
-
-def test_a_rule_of_an_include_is_for_all_that_is_in_it(check, tmp_path):
-    (tmp_path / 'part.yaml').write_text("""\
-version: 1
-nodes:
-  one:
-    publishers: {image: {type: std_msgs/msg/String, external: true}}
-    timers: {take: {period: 1, publish: image, message: x}}
-  two:
-    publishers: {images: {type: std_msgs/msg/String, external: true}}
-    timers: {take: {period: 1, publish: images, message: x}}
-""")
-    include = 'include: {{part: {{file: part.yaml, remap: {{{}: other}}}}}}\n'
-    for name in ('image', 'images'):
-        assert check('  n: {}\n', before=include.format(name), installed=False) == []
-    found = check('  n: {}\n', before=include.format('imagse'), installed=False)
-    assert found == [(2, RULE)]
-
-
-@pytest.mark.parametrize(
-    ('condition', 'found'),
-    [
-        ('{topic: a//b}', True),
-        ('{service: a b}', True),
-        ('{action: 1st}', True),
-        ('{node: a-b}', True),
-        ('{node: a//b}', True),
-        ('{topic: ~/state}', False),
-        ('{node: /left/camera}', False),
-    ],
-)
-def test_what_is_waited_for_has_a_name_of_ros(check, condition, found):
-    nodes = f'  n: {{wait_for: {condition}}}\n'
-    assert check(nodes) == ([(2 + 1, 'bad-name')] if found else [])
 
 
 def test_rules_of_processes_have_names_of_ros(check):

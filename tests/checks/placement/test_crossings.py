@@ -7,8 +7,6 @@ from composer.checks.placement.crossings import list_crossings
 from composer.cli.main import run
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.reports.report import CheckedFile, Report
-from composer.reports.text import render_files
 
 SYSTEM = """\
 version: 1
@@ -137,31 +135,6 @@ def test_a_promise_to_hand_over_is_kept_by_somebody_beside(load, split, lines):
     assert not alone or 'detector, recorder' in lines[0]
 
 
-def test_a_message_of_its_own_is_big_by_its_definition(tmp_path, check):
-    folder = tmp_path / 'lidar_msgs' / 'msg'
-    folder.mkdir(parents=True)
-    (folder / 'Scan.msg').write_text('float32[20000] ranges\n')
-    (folder / 'Few.msg').write_text('float32[200] ranges\n')
-    (folder / 'Many.msg').write_text('Scan[2] scans\n')
-    nodes = """
-  lidar:
-    worker: w
-    publishers: {a: lidar_msgs/msg/Scan, b: lidar_msgs/msg/Few, c: lidar_msgs/msg/Many}
-  map:
-    subscriptions:
-      a: {type: lidar_msgs/msg/Scan, behaviour: 'parts:see'}
-      b: {type: lidar_msgs/msg/Few, behaviour: 'parts:see'}
-      c: {type: lidar_msgs/msg/Many, behaviour: 'parts:see'}
-"""
-    messages = check(
-        nodes,
-        'def see(node, message): ...',
-        before='interfaces: {lidar_msgs: lidar_msgs}\n',
-        rule='big-crossing-message',
-    )
-    assert [each.split("'")[1] for each in messages] == ['a', 'c']
-
-
 @pytest.mark.parametrize(
     ('image', 'options', 'expected'),
     [
@@ -188,10 +161,3 @@ def test_check_says_what_crosses(load, capsys, image, options, expected):
     out = capsys.readouterr().out
     assert out.endswith(expected)
     assert expected or not out
-
-
-def test_of_much_that_crosses_the_first_lines_are_shown():
-    lines = tuple(map(str, range(12)))
-    text = render_files(Report((CheckedFile('a.yaml', nodes=1, crossings=lines),)), colour=False)
-    assert text.splitlines()[-2:] == ['  crosses: 9', '  and 2 more: composer graph shows all']
-    assert len(text.splitlines()) == 12

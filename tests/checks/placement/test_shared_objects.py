@@ -1,7 +1,5 @@
 """Names of modules that behaviours in several processes share in code."""
 
-from pathlib import Path
-
 import pytest
 
 RULE = 'shared-across-workers'
@@ -106,23 +104,3 @@ def test_hosts_are_other_processes_too(find):
     code = SHARED[0][0]
     (message,) = find(code, NODES.replace('worker: one', 'host: jetson'))
     assert message.endswith("which only 'parts:write' on host jetson changes")
-
-
-def test_a_method_counts_with_what_makes_its_instance(find):
-    code = """
-        STATE = {}
-        class Writer:
-            def __init__(self): STATE['x'] = 1
-            def write(self, node): return 1
-        def read(node): return STATE['x']
-    """
-    nodes = NODES.replace('parts:write', 'parts:Writer.write')
-    assert len(find(code, nodes)) == 1
-
-
-def test_a_comment_silences_it(find, tmp_path):
-    assert Path.cwd() == tmp_path
-    silenced = NODES.replace(
-        "'parts:read'}}}", "'parts:read'}}}  # composer: ignore[" + RULE + ']'
-    )
-    assert find(SHARED[0][0], silenced) == []

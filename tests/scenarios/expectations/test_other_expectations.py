@@ -62,14 +62,6 @@ def test_an_error_that_no_expectation_names_fails_the_case(then, is_expected):
     assert [each.path for each in failures] == ([] if is_expected else [('cases', 'c')])
 
 
-def test_the_same_error_is_told_once(said):
-    events = [at(time, 'error', "timer 'tick'", TRACEBACK) for time in range(3)]
-    ((message, _),) = said({'topic': '/a', 'never': True}, events)
-    assert message == "timer 'tick' of /n raised ValueError: too far at 0 s, and 2 more times"
-    ((message, _),) = said({'topic': '/a', 'never': True}, events[1:])
-    assert message == "timer 'tick' of /n raised ValueError: too far at 1 s, and once more"
-
-
 @pytest.mark.parametrize(
     ('then', 'code', 'message'),
     [
@@ -160,12 +152,6 @@ def test_steps_have_outcomes(step, outcome, key, message):
     failures = evaluate(case_of(), [], [Outcome(step_of(step), 10**9, **outcome)])
     assert [each.message for each in failures] == ([message] if message else [])
     assert [each.path[4] for each in failures] == ([key] if key else [])
-
-
-def test_a_step_is_not_done_after_the_end_of_the_system():
-    steps = tuple(step_of({'at': second, 'publish': '/a'}) for second in (1, 2, 3))
-    (failure,) = evaluate(case_of(steps=steps), [at(2, 'exit', '', 0)])
-    assert failure.message == 'the step at 3 s is not done: the system ended at 2 s'
 
 
 def like(found, recorded, **options):

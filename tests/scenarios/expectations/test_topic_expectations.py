@@ -160,9 +160,3 @@ def test_the_ends_of_a_window_are_exact(said):
     assert said({'topic': '/a', 'within': [0.1, 0.3]}, [event]) == []
     assert said({'topic': '/a', 'within': [0.3, 0.4]}, [event]) == []
     assert said({'topic': '/a', 'within': [0.300000001, 0.4]}, [event]) != []
-
-
-def test_ten_messages_in_a_second_are_ten_hertz(said):
-    events = [at(round(0.1 * index, 1), 'message', '/a', number(0.0)) for index in range(101)]
-    assert said({'topic': '/a', 'rate': [10, 10], 'between': [1, 2]}, events) == []
-    assert said({'topic': '/a', 'rate': [10, 10]}, events) == []

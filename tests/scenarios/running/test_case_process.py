@@ -5,15 +5,12 @@ import select
 import signal
 import subprocess
 import sys
-import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from composer.scenarios.running.case_process import CaseProcess
 from composer.scenarios.running.case_results import CaseResult
 from tests.running import is_there
-from tests.virtual_time.virtual_runs import virtual_time
 
 DEADLINE_SEC = 30
 
@@ -101,26 +98,6 @@ def test_what_ends_its_process_is_shown(function):
     assert '/case_process.py' not in stack
 
 
-def wait_for_a_pool():
-    with ThreadPoolExecutor(1) as pool:
-        pool.submit(hold_interpreter).result()
-
-
-def wait_in_turns(function):
-    with virtual_time(limit_sec=DEADLINE_SEC):
-        thread = threading.Thread(target=function)
-        thread.start()
-        thread.join()
-
-
-def test_a_pool_that_does_not_end_is_shown_with_who_waits_for_it():
-    # On a crowded machine, the pool needs its time to begin.
-    stack = failure_of(lambda: wait_in_turns(wait_for_a_pool), limit_sec=5.0).stack
-    assert 'in hold_interpreter' in stack
-    assert 'in wait_for_a_pool' in stack
-    assert 'in _park' not in stack
-
-
 @pytest.mark.parametrize('function', [loop, hold_interpreter])
 def test_what_does_not_end_is_ended_and_shown(function):
     failure = failure_of(function, limit_sec=0.3)
@@ -136,7 +113,3 @@ def test_what_it_has_started_ends_with_it(wait_for):
 
     pid = int(run(start).notices[0])
     wait_for(lambda: not is_there(pid), 'the end of what it has started')
-
-
-def test_of_much_output_the_end_is_kept():
-    assert run(lambda: print('x' * 300_000 + 'end')).output.endswith('xend\n')
