@@ -52,7 +52,7 @@ except ImportError as error:
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Sequence
 
-    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    from starlette.types import Message, Receive, Scope, Send
 
     from composer.application.running_systems.client import Client
 
@@ -162,6 +162,20 @@ class PageServer:
             'folder': str(Path.cwd()),
         }
         self._recording = Recording()
+        self._routes = Starlette(
+            routes=[
+                Route('/', self._page),
+                Route('/api/state', self._state),
+                Route('/api/events', self._events),
+                Route('/api/drawing', self._drawing),
+                Route('/api/log', self._log),
+                Route('/api/parameters', partial(self._question, list_parameters)),
+                Route('/api/message', partial(self._question, look_at_message)),
+                Route('/api/template', partial(self._question, show_template)),
+                Route('/api/act', self._act, methods=['POST']),
+                Route('/{name}', self._asset),
+            ]
+        )
         self._socket = socket.socket()
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -180,7 +194,8 @@ class PageServer:
     def run(self) -> None:
         """Serve until a signal comes."""
         config = uvicorn.Config(
-            self._guarded(self._routes()),
+            self._guarded,
+            interface='asgi3',
             log_config=None,
             access_log=False,
             server_header=False,
@@ -197,42 +212,22 @@ class PageServer:
                 self._recording.end()
             self._source.stop()
 
-    def _routes(self) -> Starlette:
-        return Starlette(
-            routes=[
-                Route('/', self._page),
-                Route('/api/state', self._state),
-                Route('/api/events', self._events),
-                Route('/api/drawing', self._drawing),
-                Route('/api/log', self._log),
-                Route('/api/parameters', partial(self._question, list_parameters)),
-                Route('/api/message', partial(self._question, look_at_message)),
-                Route('/api/template', partial(self._question, show_template)),
-                Route('/api/act', self._act, methods=['POST']),
-                Route('/{name}', self._asset),
-            ]
-        )
+    async def _guarded(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, if host, origin and secret are right."""
+        if scope['type'] != 'http':
+            return
+        self._source.looked_at = monotonic()
 
-    def _guarded(self, routes: Starlette) -> ASGIApp:
-        """Return the application behind the checks of host, origin and secret."""
+        async def send_guarded(message: Message) -> None:
+            if message['type'] == 'http.response.start':
+                added = [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
+                message = {**message, 'headers': [*message['headers'], *added]}
+            await asyncio.wait_for(send(message), _SEND_SEC)
 
-        async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
-            if scope['type'] != 'http':
-                return
-            self._source.looked_at = monotonic()
-
-            async def send_guarded(message: Message) -> None:
-                if message['type'] == 'http.response.start':
-                    added = [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
-                    message = {**message, 'headers': [*message['headers'], *added]}
-                await asyncio.wait_for(send(message), _SEND_SEC)
-
-            refusal = self._refuse(Request(scope))
-            answer = PlainTextResponse(refusal, status_code=403) if refusal else routes
-            with suppress(TimeoutError):
-                await answer(scope, receive, send_guarded)
-
-        return guarded
+        refusal = self._refuse(Request(scope))
+        answer = PlainTextResponse(refusal, status_code=403) if refusal else self._routes
+        with suppress(TimeoutError):
+            await answer(scope, receive, send_guarded)
 
     def _refuse(self, request: Request) -> str:
         """Return why a request is not served; nothing if it is."""
@@ -270,25 +265,23 @@ class PageServer:
         return FileResponse(_FILES / name) if name in _ASSETS else Response(status_code=404)
 
     async def _state(self, _request: Request) -> Response:
-        return _json(self._shown(), longest=_LONGEST_WORDS)
+        return _json(self._shown())
 
-    def _shown(self) -> dict[str, Any]:
+    def _shown(self) -> Any:
         recording = {'target': self._recording.target, 'told': self._recording.told}
-        return {**self._source.state, **self._settings, 'recording': recording, 'time': time()}
+        state = {**self._source.state, **self._settings, 'recording': recording, 'time': time()}
+        return _finite(state, _LONGEST_WORDS)
 
     async def _drawing(self, request: Request) -> Response:
         drawing = self._source.drawing
-        if drawing is None:
-            return _json({})
-        folded = frozenset(request.query_params.getlist('folded'))
+        folded = request.query_params.getlist('folded')
         # Graphviz takes a while.
-        drawn = await asyncio.to_thread(drawing.fold, folded)
-        return Response(json.dumps(drawn, separators=(',', ':')), media_type='application/json')
+        return _json(await asyncio.to_thread(drawing.fold, folded) if drawing else {})
 
     async def _log(self, request: Request) -> Response:
         after = request.query_params.get('after', '0')
         number = int(after) if after.isdecimal() and len(after) < _MOST_DIGITS else 0
-        return _json([each for each in list(self._source.log) if each['number'] > number])
+        return _json([line for line in list(self._source.log) if line['number'] > number])
 
     async def _question(self, question: Callable[..., Any], request: Request) -> Response:
         """Ask the graph, with values of the address."""
@@ -317,11 +310,12 @@ class PageServer:
         """Return what the graph answers to a question."""
         try:
             future = asyncio.wrap_future(self._source.ask(question))
-            return _json(await asyncio.wait_for(future, timeout_sec))
+            answer, code = await asyncio.wait_for(future, timeout_sec), 200
         except Exception as error:  # noqa: BLE001 - rclpy raises many kinds
             more = getattr(error, 'help', None)
             text = str(error) or 'no answer'
-            return _json({'problem': f'{text} ({more})' if more else text}, 504)
+            answer, code = {'problem': f'{text} ({more})' if more else text}, 504
+        return _json(_finite(answer, _LONGEST_TEXT), code)
 
     async def _events(self, _request: Request) -> Response:
         return StreamingResponse(self._list_states(), media_type='text/event-stream')
@@ -333,20 +327,16 @@ class PageServer:
             self._source.looked_at = now = monotonic()
             if told is not self._source.state or now > told_sec + _KEEP_ALIVE_SEC:
                 told, told_sec = self._source.state, now
-                yield f'data: {_dump(self._shown(), _LONGEST_WORDS)}\n\n'
+                yield f'data: {json.dumps(self._shown())}\n\n'
             await asyncio.sleep(_PAUSE_SEC)
 
 
-def _json(data: Any, code: int = 200, longest: int = _LONGEST_TEXT) -> Response:
-    return Response(_dump(data, longest), status_code=code, media_type='application/json')
-
-
-def _dump(data: Any, longest: int) -> str:
-    """Return data as JSON, in which no number is infinite, and no text is longer."""
-    return json.dumps(_finite(data, longest), separators=(',', ':'))
+def _json(data: Any, code: int = 200) -> Response:
+    return Response(json.dumps(data), code, media_type='application/json')
 
 
 def _finite(data: Any, longest: int) -> Any:
+    """Return data in which no number is infinite, and no text is longer."""
     if isinstance(data, str) and len(data) > longest:
         return f'{data[:longest]}…'
     if isinstance(data, float) and not math.isfinite(data):
