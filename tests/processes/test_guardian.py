@@ -19,13 +19,13 @@ CODE = """
 import ctypes
 import multiprocessing
 import os
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 from composer.runtime import stop
+from staying import stay
 
 stop._MARGIN_SEC = 0.5
 
@@ -37,18 +37,10 @@ def flood(node):
     while True:  # composer: ignore[endless-loop]
         node.logger.info('x' * 1000)
 
-def stay(deaf=False):
-    if deaf:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    # In one piece: several processes write at a time.
-    os.write(1, f'{os.getpid()} stays\\n'.encode())
-    while True:
-        time.sleep(1)
-
 def start(node, deaf=False):
-    command = [sys.executable, '-c', f'from parts import stay; stay({deaf})']
+    command = [sys.executable, '-IS', 'staying.py', *['deaf'] * deaf]
     subprocess.Popen(command)
-    subprocess.Popen(['setsid', *command], env={'PYTHONPATH': os.environ['PYTHONPATH']})
+    subprocess.Popen(['setsid', *command], env={})
     subprocess.Popen(['sh', '-c', '"$@" & exit', 'sh', *command])
     multiprocessing.Process(target=stay).start()
     multiprocessing.get_context('spawn').Process(target=stay).start()
@@ -65,6 +57,23 @@ def start_once(node):
         raise RuntimeError('again')
     again.touch()
 """
+STAYING = """
+import os
+import signal
+import sys
+import time
+
+def stay(deaf=False):
+    if deaf:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    # In one piece: several processes write at a time.
+    os.write(1, f'{os.getpid()} stays\\n'.encode())
+    while True:
+        time.sleep(1)
+
+if __name__ == '__main__':
+    stay(len(sys.argv) > 1)
+"""
 STARTED = 6
 STARTING = 'version: 1\nexecutor: {{shutdown_timeout: {}}}\nnodes: {{n: {{on_start: {}}}}}\n'
 HOLDING = """
@@ -72,6 +81,13 @@ version: 1
 executor: {shutdown_timeout: 0.5}
 nodes: {n: {timers: {t: {period: 0.02, behaviour: 'parts:hold_interpreter'}}}}
 """
+
+
+@pytest.fixture
+def compose(compose):
+    """Let behaviours find the module of what they start."""
+    (compose.folder / 'staying.py').write_text(STAYING)
+    return compose
 
 
 def started_by(child):
