@@ -139,12 +139,3 @@ def test_code_and_files_that_use_what_is_left_out_are_findings(folders: Path) ->
         ('missing-module', "'only:' of the package 'hands' leaves out 'Glove'"),
         ('unknown-type', "'only:' of the package 'hands' leaves out its message 'Glove'"),
     ]
-
-
-def test_a_package_is_built_in_part(folders: Path, shared_cache: Path, monkeypatch) -> None:
-    monkeypatch.setenv('XDG_CACHE_HOME', str(shared_cache))
-    lines: list[str] = []
-    (provided,) = provide_declared(read(folders, f'{{hands: {GRIP}}}'), lines.append)
-    modules = provided.prefix / 'python' / 'hands' / 'msg'
-    assert {path.name for path in modules.glob('_*.py')} == {'__init__.py', '_grip.py'}
-    assert lines[0] == 'hands: building 1 interface of 2 ...'

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from building import SHIPPED, RunPython, StartProgram, WriteDefinitions, process_environment
+from building import RunPython, StartProgram, WriteDefinitions, process_environment
 
 from composer.interfaces.build.provision import (
     ModuleTakenError,
@@ -26,15 +26,14 @@ from composer.interfaces.build.provision import import_packages, provide_package
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.definitions.packages import load_packages
 folders = {name: Path(folder) for name, folder in zip(sys.argv[1::2], sys.argv[2::2])}
-definitions = load_packages(folders, InterfaceCatalogue())
+definitions = load_packages(folders, InterfaceCatalogue(), {'robots': ['msg/Robot']})
 provided = provide_packages(definitions, lambda line: print(line, flush=True))
 import_packages(provided)
 for each in provided:
     print(each.package, each.origin)
 """
 StartProvider = Callable[[Path, Path], subprocess.Popen[str]]
-EXAMPLE = ('example_interfaces', SHIPPED / 'example_interfaces')
-ROBOTS = {'msg/Robot.msg': 'string name\n'}
+ROBOTS = {'msg/Robot.msg': 'string name\n', 'msg/Unused.msg': 'Robot robot\n'}
 
 
 def silent(_: str) -> None:
@@ -54,62 +53,6 @@ def start_provider(start_program: StartProgram) -> StartProvider:
         return start_program('-c', PROVIDE, 'robots', folder, env=process_environment(cache))
 
     return start
-
-
-def test_a_cached_start_imports_neither_builder_nor_generators(
-    run_python: RunPython,
-    shared_cache: Path,
-) -> None:
-    assert run_python(PROVIDE, *EXAMPLE).returncode == 0
-    code = PROVIDE + (
-        'print([name for name in sys.modules if name in {"em", "lark", "subprocess", "numpy",'
-        ' "rosidl_parser", "rosidl_pycommon", "composer.interfaces.build.builder"}])'
-    )
-    lines = run_python(code, *EXAMPLE, cache=shared_cache).stdout.splitlines()
-    assert lines == ['example_interfaces cached', '[]']
-
-
-def kill_in_mid_build(start: subprocess.Popen[str], cache: Path, pattern: str) -> bool:
-    """Kill a start as soon as a file is there that a pattern in the cache's folder fits.
-
-    Returns whether that was in time: nothing was ready yet.
-    """
-    interfaces = cache / 'composer' / 'interfaces'
-    wait_for(lambda: start.poll() is not None or any(interfaces.glob(pattern)))
-    start.kill()
-    start.communicate(timeout=60)
-    return all(path.suffix for path in interfaces.iterdir())
-
-
-def test_after_a_killed_build_starts_at_once_build_once_and_later_ones_not_at_all(
-    run_python: RunPython,
-    start_provider: StartProvider,
-    write_definitions: WriteDefinitions,
-    tmp_path: Path,
-) -> None:
-    folder = write_definitions(ROBOTS)
-    # A build may be ready before it is seen that it has begun with something.
-    cache = next(
-        cache
-        for cache in (tmp_path / str(attempt) for attempt in range(10))
-        if kill_in_mid_build(start_provider(cache, folder), cache, 'robots-*.partial/lib/*.so')
-    )
-    starts = [start_provider(cache, folder) for _ in range(3)]
-    outputs = [start.communicate(timeout=250)[0].splitlines() for start in starts]
-    built, *cached = sorted(outputs, key=lambda lines: lines[-1])
-    assert built[-3] == 'robots: building 1 interface ...'
-    assert built[-2].startswith('robots: built in ')
-    assert built[-1] == 'robots built'
-    waiting = 'robots: waiting for another start that builds it'
-    assert all(lines in (['robots cached'], [waiting, 'robots cached']) for lines in cached)
-    code = PROVIDE + 'from robots.msg import Robot; print(Robot(name="Marvin"))'
-    later = run_python(code, 'robots', folder, cache=cache, PATH='')
-    assert (later.stdout, later.stderr) == (
-        "robots cached\nrobots.msg.Robot(name='Marvin')\n",
-        '',
-    )
-    names = [path.suffix for path in (cache / 'composer' / 'interfaces').iterdir()]
-    assert sorted(names) == ['', '.lock']
 
 
 SLOW_COMPILER = """#!/bin/sh
@@ -138,32 +81,53 @@ def is_locked(path: Path) -> bool:
 
 
 @pytest.mark.usefixtures('slow_compiler')
-def test_a_killed_build_is_locked_until_its_compilers_are_done(
+def test_interrupted_and_killed_builds_leave_nothing_and_of_those_at_once_one_builds(
+    run_python: RunPython,
     start_provider: StartProvider,
     write_definitions: WriteDefinitions,
     tmp_path: Path,
 ) -> None:
-    start = start_provider(tmp_path, write_definitions(ROBOTS))
-    assert kill_in_mid_build(start, tmp_path, '../../started')
-    [lock] = (tmp_path / 'composer' / 'interfaces').glob('*.lock')
-    assert is_locked(lock)
-    (tmp_path / 'go').touch()
-    wait_for(lambda: not is_locked(lock))
-
-
-@pytest.mark.usefixtures('slow_compiler')
-def test_an_interrupted_build_leaves_nothing(
-    start_provider: StartProvider,
-    write_definitions: WriteDefinitions,
-    tmp_path: Path,
-) -> None:
-    start = start_provider(tmp_path, write_definitions(ROBOTS))
-    wait_for((tmp_path / 'started').exists)
-    start.send_signal(signal.SIGINT)
-    start.communicate(timeout=60)
-    assert start.returncode != 0
+    folder = write_definitions(ROBOTS)
     cache = tmp_path / 'composer' / 'interfaces'
-    assert [path.suffix for path in cache.iterdir()] == ['.lock']
+
+    def end_in_mid_build(number: int) -> int:
+        (tmp_path / 'started').unlink(missing_ok=True)
+        start = start_provider(tmp_path, folder)
+        wait_for((tmp_path / 'started').exists)
+        start.send_signal(number)
+        start.communicate(timeout=60)
+        return start.returncode
+
+    assert end_in_mid_build(signal.SIGINT) != 0
+    [lock] = cache.iterdir()
+    assert lock.suffix == '.lock'
+    assert end_in_mid_build(signal.SIGKILL) == -signal.SIGKILL
+    # Until its compilers are done.
+    assert is_locked(lock)
+    starts = [start_provider(tmp_path, folder) for _ in range(2)]
+    (tmp_path / 'go').touch()
+    outputs = [start.communicate(timeout=250)[0].splitlines() for start in starts]
+    built, cached = sorted(outputs, key=lambda lines: lines[-1])
+    waiting = 'robots: waiting for another start that builds it'
+    assert built[-3] == 'robots: building 1 interface of 2 ...'
+    assert built[-2].startswith('robots: built in ')
+    assert built[-1] == 'robots built'
+    assert cached in (['robots cached'], [waiting, 'robots cached'])
+    assert not is_locked(lock)
+    # One that finds it built imports nothing that a build needs.
+    code = PROVIDE + (
+        'print([name for name in sys.modules if name in {"em", "lark", "subprocess", "numpy",'
+        ' "rosidl_parser", "rosidl_pycommon", "composer.interfaces.build.builder"}])\n'
+        'from robots.msg import Robot; print(Robot(name="Marvin"))'
+    )
+    later = run_python(code, 'robots', folder, cache=tmp_path, PATH='')
+    assert (later.stdout, later.stderr) == (
+        "robots cached\n[]\nrobots.msg.Robot(name='Marvin')\n",
+        '',
+    )
+    assert sorted(path.suffix for path in cache.iterdir()) == ['', '.lock']
+    modules = cache.glob('robots-*/python/robots/msg/_*.py')
+    assert {path.name for path in modules} == {'__init__.py', '_robot.py'}
 
 
 def test_an_installed_package_is_used(write_definitions: WriteDefinitions) -> None:
