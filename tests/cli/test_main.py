@@ -47,12 +47,6 @@ def start(command, folder=ROOT, **variables):
     )
 
 
-def run_without_ros(*arguments, folder=ROOT):
-    """Run Composer in a process in which ROS cannot be imported."""
-    main = f'{WITHOUT_ROS}\nfrom composer.cli.main import main\nmain()'
-    return start([sys.executable, '-c', main, *map(str, arguments)], folder)
-
-
 @pytest.fixture
 def run(capsys):
     """Return exit code, standard output and standard error of a command."""
@@ -81,19 +75,25 @@ def test_a_file_with_errors_fails_with_all_of_them(run):
     assert out.replace(f'{folder}/', '') == expected + '\n'
 
 
-def test_check_imports_nothing_of_ros():
-    path = ROOT / 'configs' / 'parameter.yaml'
-    result = run_without_ros('check', path)
-    assert (result.returncode, result.stderr) == (0, '')
-    assert result.stdout.startswith(f'{path}: ok, ')
+def test_a_check_imports_nothing_of_ros_and_only_what_the_file_needs():
+    script = f"""{WITHOUT_ROS}
+from composer.cli.main import run
+
+code = run(['check', '-q', 'configs/greeter.yaml'])
+print(code, *({{'asyncio', 'jinja2', 'jsonschema', 'rclpy', 'statistics'}} & {{*sys.modules}}))
+run(['check', 'configs/parameter.yaml'])
+"""
+    done = start([sys.executable, '-c', script])
+    assert done.stderr == ''
+    assert done.stdout.startswith('0\nconfigs/parameter.yaml: ok, ')
 
 
-def test_check_imports_no_behaviour(tmp_path):
-    (tmp_path / 'noisy.py').write_text("open('ran', 'w')\nraise SystemExit(7)\ndef f(node): ...\n")
-    (tmp_path / 'a.yaml').write_text('version: 1\nnodes: {a: {on_start: noisy:f}}\n')
-    result = run_without_ros('check', 'a.yaml', folder=tmp_path)
-    assert (result.returncode, result.stdout) == (0, 'a.yaml: ok, 1 node\n')
-    assert not (tmp_path / 'ran').exists()
+def test_check_imports_no_behaviour(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path('noisy.py').write_text("open('ran', 'w')\nraise SystemExit(7)\ndef f(node): ...\n")
+    Path('a.yaml').write_text('version: 1\nnodes: {a: {on_start: noisy:f}}\n')
+    assert run('check', 'a.yaml') == (0, 'a.yaml: ok, 1 node\n', '')
+    assert not Path('ran').exists()
 
 
 def test_a_terminal_without_the_characters_gets_escapes(tmp_path):
@@ -104,12 +104,10 @@ def test_a_terminal_without_the_characters_gets_escapes(tmp_path):
     assert r"a.yaml:2:9: error[bad-name]: '\u65e5\u672c' cannot name a node" in result.stdout
 
 
-def test_names_of_files_may_be_any_bytes(tmp_path):
-    result = run_without_ros(
-        'check', b'caf\xe9.yaml'.decode(errors='surrogateescape'), folder=tmp_path
-    )
-    assert result.returncode == 1
-    assert r'caf\udce9.yaml: error[unreadable-file]: ' in result.stdout
+def test_names_of_files_may_be_any_bytes(run):
+    code, out, _ = run('check', b'caf\xe9.yaml'.decode(errors='surrogateescape'))
+    assert code == 1
+    assert r'caf\udce9.yaml: error[unreadable-file]: ' in out
 
 
 # Exit codes
@@ -244,18 +242,6 @@ def test_what_is_raised_on_purpose_becomes_an_exit_code(run, monkeypatch, raised
 )  # fmt: skip
 def test_ros_arguments_are_taken_out(arguments, own, ros):
     assert cli.split_ros_arguments(arguments) == (own, ros)
-
-
-def test_a_check_imports_only_what_the_file_needs():
-    script = """
-import sys
-from composer.cli.main import run
-
-code = run(['check', '-q', 'configs/greeter.yaml'])
-print(code, *({'asyncio', 'jinja2', 'jsonschema', 'rclpy', 'statistics'} & {*sys.modules}))
-"""
-    done = start([sys.executable, '-c', script])
-    assert (done.stdout, done.stderr) == ('0\n', '')
 
 
 # What somebody who comes from other tools writes

@@ -336,20 +336,14 @@ def test_a_compiler_that_fails_is_shown(
     assert '  an error of mine' in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ('version', 'module'),
-    [('0.4', ''), ('4.0', 'class Interpreter: pass\n')],
-)
 def test_a_template_engine_that_does_not_fit_is_named(
     write_definitions: WriteDefinitions,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    version: str,
-    module: str,
 ) -> None:
-    (tmp_path / 'em.py').write_text(f'{module}__version__ = {version!r}\n')
+    (tmp_path / 'em.py').write_text("class Interpreter: pass\n__version__ = '4.0'\n")
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
     with pytest.raises(BuildError) as caught:
         build_into(tmp_path / 'robots', write_definitions, {'msg/A.msg': 'int32 a\n'})
-    expected = f'the module em of version {version} ({tmp_path}/em.py) does not fit'
+    expected = f'the module em of version 4.0 ({tmp_path}/em.py) does not fit'
     assert expected in str(caught.value)
