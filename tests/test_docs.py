@@ -100,25 +100,18 @@ def test_the_modeline_of_shipped_systems_names_the_schema():
 # Hooks
 
 
-def test_the_hook_runs_a_command_that_there_is(tmp_path):
+def test_the_hook_runs_a_command_that_there_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     (hook,) = yaml.safe_load((ROOT / '.pre-commit-hooks.yaml').read_text())
     assert (hook['id'], hook['language'], hook['types']) == ('composer-check', 'python', ['yaml'])
     (tmp_path / 'rover.yaml').write_text('version: 1\nnodes: {1st: {}}\n')
     (tmp_path / 'compose.yaml').write_text('version: "3"\nservices: {}\n')
     words = hook['entry'].split()
     assert words[0] == 'composer'
-    result = subprocess.run(
-        [sys.executable, '-m', *words, 'compose.yaml', 'rover.yaml'],
-        cwd=tmp_path,
-        env={'PYTHONPATH': str(ROOT), 'PATH': ''},
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
-    assert result.returncode == 1
-    assert result.stdout.count('error[') == 1
-    assert result.stdout.startswith('rover.yaml:2:9: error[bad-name]: ')
+    assert cli.run([*words[1:], 'compose.yaml', 'rover.yaml']) == 1
+    out = capsys.readouterr().out
+    assert out.count('error[') == 1
+    assert out.startswith('rover.yaml:2:9: error[bad-name]: ')
 
 
 def test_the_action_checks_what_its_inputs_say(tmp_path):

@@ -122,29 +122,6 @@ def test_one_name_for_all_repetitions_is_said_with_the_way_out(name, foreach, ma
     assert finding.help == help_text
 
 
-def test_more_entries_than_anybody_wants_need_to_be_asked_for():
-    text = 'nodes: {"n{{ i }}": {foreach: {i: "{{ range(2001) }}"}}}\n'
-    (finding,) = load(f'max_nodes: 2000\n{text}').diagnostics
-    assert finding.rule == 'too-many-entries'
-    assert finding.message == 'nodes has more than 2,000 entries'
-    assert len(load(f'max_nodes: 2001\n{text}').spec.nodes) == 2001
-    (finding,) = load(text.replace('2001', '10001')).diagnostics
-    assert finding.message == 'nodes has more than 10,000 entries'
-
-
-def test_alternatives_of_one_name_may_exclude_each_other():
-    system = load(
-        """
-args: {sim: true, name: camera}
-nodes:
-  "{{ name }}": {when: "{{ not sim }}", description: real}
-  camera: {when: "{{ sim }}", description: simulated}
-"""
-    )
-    assert not system.diagnostics
-    assert system.spec.nodes['camera'].description == 'simulated'
-
-
 def test_here_is_the_folder_of_the_file_and_env_the_environment(tmp_path, monkeypatch):
     monkeypatch.setenv('ROBOT', 'r2')
     path = tmp_path / 'a.yaml'
@@ -152,7 +129,6 @@ def test_here_is_the_folder_of_the_file_and_env_the_environment(tmp_path, monkey
         'version: 1\nnodes: {n: {parameters: {a: "{{ here }}", b: "{{ env(\'ROBOT\') }}", '
         "c: \"{{ env('NO_SUCH', 'none') }}\"}}}\n"
     )
-    from composer.language.pipeline import load_system
 
     system = load_system(path)
     values = {name: each.value for name, each in system.spec.nodes['n'].parameters.items()}
@@ -177,12 +153,6 @@ nodes:
         ),
         ('uninstalled-package', "no package 'no_such_package' is installed"),
     ]
-
-
-@pytest.mark.parametrize('limit', ['-1', '0'])
-def test_a_limit_that_is_none_limits_nothing(limit):
-    system = load(f'max_nodes: {limit}\nnodes:\n  "a_{{{{ i }}}}": {{foreach: {{i: [1, 2]}}}}\n')
-    assert [each.rule for each in system.diagnostics] == ['out-of-range']
 
 
 # A value of each kind of entity, repeated and left out.
@@ -254,42 +224,6 @@ nodes:
     ]
     assert [*system.spec.nodes['n'].subscriptions] == ['x_1', 'x_2']
     assert not system.spec.nodes['n'].timers
-
-
-def test_what_is_left_out_of_a_node_of_an_include_is_left_out(tmp_path):
-    (tmp_path / 'part.yaml').write_text(
-        'version: 1\nargs: {debug: false}\nnodes:\n  n:\n    publishers:\n'
-        '      image: std_msgs/msg/String\n'
-        '      marked: {when: "{{ debug }}", type: std_msgs/msg/String}\n'
-    )
-    main = tmp_path / 'main.yaml'
-    main.write_text(
-        'version: 1\ninclude:\n  "{{ side }}": {foreach: {side: [left, right]}, '
-        'namespace: "{{ side }}", file: part.yaml, args: {debug: "{{ side == \'left\' }}"}}\n'
-    )
-    system = load_system(main)
-    assert not system.diagnostics
-    assert [[*node.publishers] for node in system.spec.nodes.values()] == [
-        ['image', 'marked'],
-        ['image'],
-    ]
-
-
-def test_what_is_left_out_is_not_checked_for_what_its_values_would_be():
-    text = """
-args: {container: ''}
-containers:
-  own: {name: own, when: "{{ container == '' }}", components: {}}
-  other:
-    when: "{{ container != '' }}"
-    name: "{{ container }}"
-    components: {x: {package: a, plugin: 'b::C', remap: {a: "{{ container }}"}}}
-  "/{{ container }}": {when: "{{ container != '' }}", components: {}}
-"""
-    for words in ([], ['container:=all']):
-        assert messages(load(text, words)) == []
-    wrong = text.replace('remap:', 'remaps:')
-    assert [rule for rule, _ in messages(load(wrong, []))] == ['unknown-key']
 
 
 def test_an_expression_without_a_value_leaves_out_what_it_stands_for():

@@ -78,25 +78,6 @@ def test_keys_and_items_are_filled_too():
     assert loaded.spec.nodes['n'].state == {'rover_a': [3, {'b3': 1}], 'true': 2}
 
 
-def test_what_lies_below_a_filled_key_keeps_its_place():
-    loaded = load_system_text(
-        'version: 1\nargs: {name: a}\nnodes:\n  "{{ name }}_x":\n    timers: 3\n    tmers: {}\n'
-        '    state: {y: "{{ nome }}"}\n'
-    )
-    assert [f'{each.span.line}:{each.span.column}' for each in loaded.diagnostics] == [
-        '7:20',
-        '6:5',
-        '5:13',
-    ]
-    assert list(loaded.spec.nodes) == ['a_x']
-
-
-def test_a_filled_key_that_is_there_already_is_a_duplicate():
-    ((rule, message, place, text),) = findings('{rover: 1, "{{ name }}": 2}')
-    assert (rule, message) == ('duplicate-key', "the key 'rover' appears twice in one mapping")
-    assert (place, text) == ('7:18', '"{{ name }}"')
-
-
 @pytest.mark.parametrize(
     ('state', 'name', 'place'),
     [
@@ -238,11 +219,6 @@ def test_a_check_takes_defaults_and_the_first_choice_as_they_are():
     assert check(SAMPLED.replace('{{ level }}', '{{ mode }}')) == [('bad-value', 6)]
 
 
-def test_a_check_finds_what_is_wrong_whatever_the_value_is():
-    text = SAMPLED.replace('{{ level }}', '{{ level + nothing }}').replace('Int32', 'Int 32')
-    assert [rule for rule, _ in check(text)] == ['undefined-name', 'bad-value']
-
-
 WANTS = {
     'executor': '{threads: "{{ v }}", shutdown_timeout: "{{ v }}"}',
     'qos': '{p: {depth: "{{ v }}", history: "{{ v }}", deadline: "{{ v }}"}}',
@@ -278,21 +254,6 @@ def test_with_the_values_in_place_the_schema_accepts_no_expression():
     text = 'version: 1\nargs: {v: {default: x}}\nnodes: {n: {timers: {t: {period: "{{ \'{{ v }}\' }}", behaviour: a:b}}}}'
     (finding,) = load_system_text(text).diagnostics
     assert finding.message == "expected a number, got '{{ v }}'"
-
-
-def test_editors_and_composer_agree_that_declarations_hold_no_expressions():
-    data = {'version': 1, 'nodes': {}, 'args': {'a': {'type': '{{ v }}'}}}
-    validator = Draft202012Validator(json.loads(schema_path().read_text()))
-    assert not validator.is_valid(data)
-    text = 'version: 1\nnodes: {}\nargs: {v: string, a: {type: "{{ v }}"}}\n'
-    assert [each.rule for each in load_system_text(text).diagnostics] == ['bad-value']
-
-
-@pytest.mark.parametrize('expression', ['range(conut)', 'range(2, conut)', 'env(conut)'])
-def test_an_undefined_name_in_a_call_is_one(expression):
-    (finding,) = load(f'x: "{{{{ {expression} }}}}"').diagnostics
-    assert (finding.rule, finding.message) == ('undefined-name', "'conut' is not defined")
-    assert finding.help == "did you mean 'count'?"
 
 
 @pytest.mark.parametrize(

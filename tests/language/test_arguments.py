@@ -88,10 +88,6 @@ def test_words_that_do_not_fit_are_refused(words, message):
     assert refusal(*words) == message
 
 
-def test_a_number_beyond_all_bounds_is_refused():
-    assert refusal('a', '9' * 300).startswith("'count': expected an integer, got '999")
-
-
 def test_all_that_is_wrong_is_one_error_that_shows_what_is_declared():
     with pytest.raises(UsageError) as caught:
         load_system_text(ARGUMENTS, words=['cuont:=3', 'rate:=fast', 'loud:=true', 'loud:=false'])
@@ -113,28 +109,6 @@ def test_a_file_without_arguments_takes_no_words():
 
 def test_a_file_without_arguments_says_so():
     assert describe_arguments({}) == 'the file declares no arguments'
-
-
-@pytest.mark.parametrize(
-    ('declaration', 'finding'),
-    [
-        ('a: {type: [x]}', ('bad-value', '2:18')),
-        ('a: {defualt: 3}', ('unknown-key', '2:12')),
-        ('a: {default: {b: 1}}', ('wrong-type', '2:21')),
-        ('a: {default: fast, type: integer}', ('bad-argument-declaration', '2:21')),
-        ('a: {default: 4, choices: [1, 2]}', ('bad-argument-declaration', '2:21')),
-        ('a: {choices: [1, two], type: integer}', ('bad-argument-declaration', '2:25')),
-        ('a..b: 1', ('bad-argument-declaration', '2:8')),
-        ('my name: 1', ('bad-argument-declaration', '2:8')),
-    ],
-)
-def test_a_wrong_declaration_is_said_before_any_word_is_held_against_it(declaration, finding):
-    text = f'version: 1\nargs: {{{declaration}}}\nnodes: {{}}\n'
-    for words in (None, [], ['a:=x', 'b:=3']):
-        findings = load_system_text(text, words=words).diagnostics
-        assert [(each.rule, f'{each.span.line}:{each.span.column}') for each in findings] == [
-            finding
-        ]
 
 
 @pytest.mark.parametrize(

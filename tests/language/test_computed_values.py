@@ -124,21 +124,6 @@ def test_a_given_argument_has_the_type_of_its_computed_default():
         load_system_text(DECLARED, words=['camera.profil:=1x2'])
 
 
-@pytest.mark.parametrize(
-    ('expression', 'column', 'message', 'advice'),
-    [
-        ("args['camera.profil']", 46, "there is no argument 'camera.profil'", 'camera.profile'),
-        ('camera.profile', 40, "'camera' is not defined", "write args['camera.profile']"),
-    ],
-)
-def test_an_argument_with_dots_is_read_through_args(expression, column, message, advice):
-    text = f'version: 1\nargs: {{camera.profile: 1}}\nnodes: {{n: {{parameters: {{abcdefgh: "{{{{ {expression} }}}}"}}}}}}\n'
-    (finding,) = load_system_text(text).diagnostics
-    assert (finding.rule, finding.message) == ('undefined-name', message)
-    assert finding.span.column == column
-    assert advice in finding.help
-
-
 def test_each_file_has_its_own_variables(tmp_path):
     (tmp_path / 'part.yaml').write_text(
         'version: 1\nargs: {a.b: 1, c: "{{ args[\'a.b\'] + 1 }}"}\nvars: {v: "{{ c * 10 }}"}\n'

@@ -130,16 +130,6 @@ def test_a_layer_declares_only_arguments_that_it_uses(write, layers, found):
     assert [each.message for each in system.diagnostics] == found
 
 
-def test_a_layer_may_remove_and_change_what_one_before_it_adds(write):
-    layers = {
-        'one': 'nodes: {new: {publishers: {c: std_msgs/msg/String}}, old: {}}',
-        'two': 'nodes: {new: {log_level: debug}, old: null, other: {}}',
-    }
-    system = load(write(base=BASE, **layers))
-    assert not system.diagnostics
-    assert list(system.spec.nodes) == ['talker', 'listener', 'new', 'other']
-
-
 def test_a_later_layer_wins_over_an_earlier_one(write):
     layers = {name: f'nodes: {{talker: {{log_level: {name}}}}}' for name in ('debug', 'error')}
     assert load(write(base=BASE, **layers)).spec.nodes['talker'].log_level == 'error'
@@ -219,26 +209,9 @@ def test_a_finding_in_a_setting_is_said_at_the_setting(write):
     assert finding.span.text == 'loud'
 
 
-def test_null_is_a_value_of_warn_after(write):
-    base = 'version: 1\nnodes: {talker: {warn_after: 3}, other: {warn_after: 3}}\n'
-    site = 'nodes: {talker: {warn_after: null}, new: {warn_after: null, state: {x: null}}}'
-    system = load(write(base=base, site=site), 'nodes.other.warn_after=null')
-    assert [each.warn_after_sec for each in system.spec.nodes.values()] == [None] * 3
-    assert system.spec.nodes['new'].state == {'x': None}
-
-
 def test_names_of_sections_are_names_like_others(write):
     system = load(
         write(base='version: 1\nnodes: {timers: {description: x}}\n'),
         'nodes.timers.log_level=debug',
     )
     assert system.spec.nodes['timers'].log_level == 'debug'
-
-
-def test_a_setting_of_one_item_of_a_list_says_how_to_set_the_list(write):
-    paths = write(base='version: 1\nnodes: {a: {parameter_files: [x.yaml]}}\n')
-    with pytest.raises(UsageError) as caught:
-        load(paths, 'nodes.a.parameter_files.0=y.yaml')
-    assert caught.value.help == (
-        'give the whole list, as in --set "nodes.a.parameter_files=[first, second]"'
-    )

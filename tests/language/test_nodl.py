@@ -218,14 +218,18 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize('way', WAYS)
-@pytest.mark.parametrize('in_file', [False, True], ids=['inline', 'in a file'])
-@pytest.mark.parametrize('given', LIBRARY_FINDINGS)
+@pytest.mark.parametrize(
+    ('way', 'in_file', 'given'),
+    [
+        *(('named', False, given) for given in LIBRARY_FINDINGS),
+        *((way, True, 'rate: 60.0') for way in WAYS),
+        ('of the program', False, 'rate: 60.0'),
+        ('of a component', False, 'ratr: 10.0'),
+    ],
+)
 def test_a_parameter_library_says_what_values_are_right(
     tmp_path, monkeypatch, installed, way, in_file, given
 ):
-    if way == 'of the node' and not in_file:
-        pytest.skip('the values of several nodes stand in files')
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'driver.yaml').write_text(LIBRARY)
     (tmp_path / 'values.yaml').write_text(f'front: {{ros__parameters: {{{given}}}}}\n')

@@ -113,17 +113,6 @@ def test_a_relative_namespace_lies_in_the_default_one(default, own, full):
     assert load_node(text, f'defaults: {{namespace: "{default}"}}').namespace == full
 
 
-def test_entities_inherit_how_errors_are_met():
-    node = load_node(
-        '{on_error: restart,'
-        ' timers: {a: {period: 1, behaviour: m:f}, b: {period: 1, behaviour: m:f, on_error: log}},'
-        ' subscriptions: {a: {type: p/msg/T, behaviour: m:f},'
-        ' b: {type: p/msg/T, behaviour: m:f, on_error: shutdown}}}'
-    )
-    assert [timer.on_error for timer in node.timers.values()] == ['restart', 'log']
-    assert [sub.on_error for sub in node.subscriptions.values()] == ['restart', 'shutdown']
-
-
 def test_entities_inherit_how_long_they_may_run():
     def entities(key, entry):
         return f' {key}: {{a: {{{entry}}}, b: {{{entry}, warn_after: 0.5}}, c: {{{entry}, warn_after: null}}}},'
@@ -194,11 +183,6 @@ def test_qos_has_three_forms(text, profile, policies):
     qos = load_node(node, 'qos: {fast: {depth: 1}}').publishers['a'].qos
     assert (qos.profile, qos.policies) == (profile, policies)
     assert all(type(value) is not float for key, value in policies.items() if key == 'depth')
-
-
-def test_named_qos_profiles_are_kept_by_name():
-    spec = load('nodes: {}\nqos: {fast: {profile: sensor_data, depth: 1}}')
-    assert spec.qos['fast'] == QosSpec('sensor_data', {'depth': 1}, ('qos', 'fast'))
 
 
 def test_a_subscription_has_all_that_is_declared():
@@ -284,44 +268,3 @@ def test_the_type_of_a_parameter_is_told_by_its_value(text, type_name, value):
     parameter = load_node(f'{{parameters: {{a: {text}}}}}').parameters['a']
     assert parameter.type == type_name
     assert repr(parameter.value) == repr(value)
-
-
-def test_remapping_rules_keep_their_order():
-    assert load_node('{remap: {b: c, a: ~/d}}').remap == (('b', 'c'), ('a', '~/d'))
-
-
-def test_the_mappings_of_specs_cannot_be_changed():
-    node = load_node('{state: {a: 1}, publishers: {a: p/msg/T}}')
-    with pytest.raises(TypeError):
-        node.publishers['b'] = None
-    with pytest.raises(TypeError):
-        node.state['a'] = 2
-
-
-@pytest.mark.parametrize(
-    ('old', 'new', 'is_kept'),
-    [
-        ('{state: {n: 1, m: 2}}', '{state: {n: 1, m: 2}}', True),
-        ('{state: {n: 1, m: 2}}', '{state: {m: 2, n: 1}}', False),
-        ('{state: {n: 1}}', '{state: {n: 1.0}}', False),
-        ('{state: {n: 1}}', '{state: {n: true}}', False),
-        ('{state: {n: .nan}}', '{state: {n: .nan}}', False),
-        ('{state: {n: 0.0}}', '{state: {n: -0.0}}', False),
-        ('{rosout: true}', '{rosout: true, on_error: log}', False),
-    ],
-)
-def test_a_record_is_kept_where_its_data_are_the_same(tmp_path, old, new, is_kept):
-    path = tmp_path / 'system.yaml'
-    path.write_text(f'version: 1\nnodes: {{rover: {old}}}\n')
-    before = load_system(path)
-    path.write_text(f'version: 1\nnodes:\n  further:\n  rover: {new}\n')
-    after, alone = load_system(path, before=before), load_system(path)
-    assert (after.spec.nodes['rover'] is before.spec.nodes['rover']) is is_kept
-    assert repr(after.spec) == repr(alone.spec)
-
-
-@pytest.mark.parametrize('name', ['..yaml', '...yaml'])
-def test_a_file_of_dots_alone_names_no_folder(tmp_path, name):
-    (tmp_path / name).write_text('version: 1\nnodes: {}\n')
-
-    assert load_system(tmp_path / name).spec.name == 'system'

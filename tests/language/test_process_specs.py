@@ -70,16 +70,6 @@ def test_the_process_itself_wins_over_defaults(load):
     assert camera.parameters == {'use_sim_time': False, 'a': 1}
 
 
-def test_what_a_plain_command_waits_for_lies_in_the_namespace_of_its_file(load):
-    plain = load(robot=DRIVERS).spec.processes['plain']
-
-    assert conditions(plain) == [
-        ('process', 'camera'),
-        ('topic', 'drivers/image'),
-        ('node', '/far'),
-    ]
-
-
 def test_an_include_moves_programs_of_ros_and_what_others_wait_for(load):
     robot = """
         version: 1
@@ -111,24 +101,6 @@ def test_an_include_moves_programs_of_ros_and_what_others_wait_for(load):
     ]
     users = [conditions(node)[0] for node in system.spec.nodes.values()]
     assert users == [('process', 'camera'), ('process', 'right_camera')]
-
-
-def test_what_is_published_under_another_name_is_no_circle(load):
-    text = """
-        version: 1
-        nodes:
-          filter:
-            remap: {~/scan: /filtered}
-            wait_for: {topic: filter/scan}
-            publishers: {~/scan: {type: std_msgs/msg/Empty, external: true}}
-    """
-    system = load(robot=text)
-    rules = [each.rule for each in check_system(system, InterfaceCatalogue())]
-    assert 'wait-cycle' in rules
-
-    text = text.replace('topic: filter/scan', 'topic: /far/scan')
-    rules = [each.rule for each in check_system(load(robot=text), InterfaceCatalogue())]
-    assert 'wait-cycle' not in rules
 
 
 def test_who_waits_for_its_own_remapped_topic_waits_in_a_circle(load):

@@ -78,7 +78,7 @@ def test_rclpy_says_the_same_but_for_what_the_module_names():
         return create_qos_profile(spec_of(seen), {})
 
     verdicts = set()
-    for offered, requested in [*differing_in_one_policy(), *anything(7, 3000)]:
+    for offered, requested in [*differing_in_one_policy(), *anything(7, 1000)]:
         verdict, reason = qos_check_compatible(
             as_rclpy_sees_it(offered, is_publisher=True),
             as_rclpy_sees_it(requested, is_publisher=False),
@@ -122,43 +122,5 @@ def test_publishers_and_subscriptions_connect_if_and_only_if_nothing_is_said(con
         wait_for(publisher.get_subscription_count, f'{offered} to meet {requested}')
     for publisher, offered, requested in apart:
         assert publisher.get_subscription_count() == 0, (offered, requested)
-    for node in nodes:
-        node.destroy_node()
-
-
-@pytest.mark.ros
-def test_clients_find_servers_if_and_only_if_nothing_is_said(context, wait_for):
-    import rclpy
-    from std_srvs.srv import Empty
-
-    from composer.runtime.messages.qos_profiles import create_qos_profile
-
-    values = {
-        'reliability': ['reliable', 'best_effort'],
-        'durability': ['volatile', 'transient_local'],
-        'deadline': [None, 1],
-    }
-    pairs = [
-        (PLAIN | {policy: served}, PLAIN | {policy: used})
-        for policy, choices in values.items()
-        for served, used in product(choices, choices)
-    ]
-    nodes = [rclpy.create_node(name, context=context) for name in ('server', 'client')]
-
-    def conflicts(pair):
-        return never_match(*pair) + never_match(*reversed(pair))
-
-    clients = []
-    for index, pair in enumerate(sorted(pairs, key=lambda pair: not conflicts(pair))):
-        profiles = [create_qos_profile(spec_of(each), {}) for each in pair]
-        nodes[0].create_service(Empty, f'service_{index}', print, qos_profile=profiles[0])
-        client = nodes[1].create_client(Empty, f'service_{index}', qos_profile=profiles[1])
-        clients.append((client, pair))
-    assert [bool(conflicts(pair)) for _, pair in clients].count(True) == 6
-    for client, pair in reversed(clients):
-        if conflicts(pair):
-            assert not client.service_is_ready(), pair
-        else:
-            wait_for(client.service_is_ready, f'{pair} to meet')
     for node in nodes:
         node.destroy_node()

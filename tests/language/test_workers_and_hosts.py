@@ -236,18 +236,6 @@ def test_an_inventory_is_a_layer_of_its_own(load):
     assert (network.peers, network.domain_id) == (('10.0.0.9',), None)
 
 
-def test_a_kind_of_discovery_alone_is_a_network(load):
-    spec = load(robot='version: 1\nnetwork: peers\nnodes: {here: {}}\n')
-    assert spec.network.discovery == 'peers'
-    assert load(robot='version: 1\nnodes: {here: {}}\n').network is None
-
-
-def test_a_setting_changes_a_worker_that_is_only_named(load):
-    robot = 'version: 1\nworkers: {b: {}}\nnodes: {here: {worker: a}, there: {worker: b}}\n'
-    spec = load('workers.a.nice=5', 'workers.b.cpus=[1]', robot=robot)
-    assert (spec.workers['a'].nice, spec.workers['b'].cpus) == (5, (1,))
-
-
 def test_a_system_has_a_part_for_each_host_and_each_worker(load):
     spec = load(
         robot="""
@@ -276,15 +264,6 @@ def test_a_system_has_a_part_for_each_host_and_each_worker(load):
     own, legs = base.in_worker(''), base.in_worker('legs')
     assert ([*own.nodes], [*own.processes], [*own.workers]) == (['think'], ['recorder'], ['legs'])
     assert ([*legs.nodes], [*legs.processes], [*legs.workers]) == (['walk'], [], ['legs'])
-
-
-def test_a_record_that_is_kept_has_the_host_that_its_worker_has_now(load):
-    robot = 'version: 1\nworkers: {a: {host: x}}\nnodes: {here: {worker: a}}\n'
-    load(robot=robot)
-    before = load_system(Path('robot.yaml'))
-    Path('robot.yaml').write_text(robot.replace('{host: x}', '{}'))
-    after = load_system(Path('robot.yaml'), before=before)
-    assert (before.spec.nodes['here'].host, after.spec.nodes['here'].host) == ('x', '')
 
 
 @pytest.mark.parametrize(

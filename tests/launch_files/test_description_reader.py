@@ -1,6 +1,5 @@
 """Launch descriptions → systems, with stand-ins for the objects of `launch`."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -195,43 +194,6 @@ def test_what_code_reads_is_fixed(tmp_path, entity, what, arguments, given):
     assert 'x.launch.py side:=VALUE' in caught.value.help
 
 
-def test_a_fixed_argument_keeps_its_computed_default(tmp_path):
-    """Where a package is differs from machine to machine."""
-    map_file = launch.DeclareLaunchArgument('map', [SIDE, '.yaml'])
-    system = read(map_file, node(arguments=[launch.Shouted('map')]))
-    declared = yaml.safe_load(system.text)['args']
-    assert declared['map']['choices'] == [declared['map']['default']] == ['{{ side }}.yaml']
-    assert declared['side']['choices'] == ['left']
-    resolved(tmp_path, system)
-    with pytest.raises(UsageError, match="'map': 'x' is not one of"):
-        resolved(tmp_path, system, 'map:=x')
-
-
-def test_a_value_that_nothing_declares_may_have_been_read(tmp_path):
-    place = Place(launch.Loader(), {'robots': '3'})
-    DescriptionReader(place).read([node()])
-    place.declare_rest()
-    system = render_system(place.result, Path('x.launch.py'))
-    with pytest.raises(UsageError, match="'robots': '4' is not one of 3"):
-        resolved(tmp_path, system, 'robots:=4')
-
-
-@pytest.mark.parametrize('given', ['left', '/tmp/other', ''])
-@pytest.mark.parametrize('parts', [('/tmp/a', SIDE), ('/tmp/a', 'b', SIDE, 'c.yaml')])
-def test_an_absolute_argument_replaces_what_it_is_joined_to(tmp_path, parts, given):
-    place = Place(launch.Loader(), {})
-    path = launch.PathJoinSubstitution(python(*parts))
-    entities = [launch.DeclareLaunchArgument('side', 'left'), node(arguments=[path])]
-    DescriptionReader(place).read([launch.LaunchDescription(entities)])
-    system = render_system(place.result, Path('x.launch.py'), Path('/tmp/a/x.yaml'))
-    (process,) = resolved(tmp_path, system, f'side:={given}').values()
-    expected = os.path.join(*(given if each is SIDE else each for each in parts))  # noqa: PTH118
-    start = str(tmp_path) if not given.startswith('/') else ''
-    assert os.path.normpath(process.arguments[0]) == os.path.normpath(
-        expected.replace('/tmp/a', start, 1) if start else expected
-    )
-
-
 def test_components_of_one_name_in_two_namespaces_and_containers(tmp_path):
     components = [
         launch.ComposableNode('rectify', namespace, remappings=[('image', 'image_mono')])
@@ -380,19 +342,6 @@ def test_an_argument_without_a_value_is_asked_for():
     with pytest.raises(LaunchError, match="requires the argument 'port'") as caught:
         read(launch.DeclareLaunchArgument('port'))
     assert caught.value.help == 'give it a value: port:=…'
-
-
-def test_paths_below_the_folder_of_the_system_are_relative_to_it(tmp_path):
-    program, other = str(tmp_path / 'parts' / 'run.py'), f'{tmp_path}_2/run.py'
-    place = Place(launch.Loader(), {})
-    process = launch.ExecuteLocal([python(program), python(other)])
-    DescriptionReader(place).read([launch.LaunchDescription([process])])
-    system = render_system(place.result, Path('x.launch.py'), tmp_path / 'x.yaml')
-
-    (data,) = yaml.safe_load(system.text)['processes'].values()
-    assert data['command'] == ['{{ here }}/parts/run.py', other]
-    (spec,) = resolved(tmp_path, system).values()
-    assert list(spec.command) == [program, other]
 
 
 def test_a_file_that_launch_code_writes_is_copied_beside_the_system(tmp_path):

@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 
 from composer.cli.main import run as run_command
 from composer.diagnostics import SourceFile, Span
-from composer.planning.plan import Action, Change, Operation, Plan
+from composer.planning.plan import Change
 from composer.planning.text import describe_change
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -246,14 +246,3 @@ def test_long_values_are_cut_around_their_difference():
     assert 'word_30' in old
     assert 'other' in new
     assert all(len(each) <= 62 and each[0] + each[-1] == '……' for each in (old, new))
-
-
-def test_operations_are_counted_by_their_nouns():
-    span = Span(SourceFile('robot.yaml', ()), 1, 1)
-
-    def added(noun):
-        return Operation(Action.ADD, noun, ('', noun, noun), noun, span)
-
-    counted = Plan('robot', (added('process'), added('timer'), added('process')))
-
-    assert counted.summarize() == '+2 processes, +1 timer'

@@ -1,17 +1,12 @@
 """What an edit of workers does, and of the nodes in them."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
 
 from composer.cli.main import run as run_command
-from composer.language.pipeline import load_system
-from composer.planning.differences import compare, find_new_start
-from composer.planning.snapshot import Snapshot
-from composer.planning.snapshot_data import decode_snapshot, encode_snapshot
 
 SCHEMA = json.loads((Path(__file__).parents[2] / 'schemas' / 'plan.schema.json').read_text())
 SYSTEM = """\
@@ -113,32 +108,3 @@ def test_the_document_is_as_its_schema_says(plan, name):
     assert len(document['operations']) == len(told)
     kinds = {each['kind']: each['node'] for each in document['operations']}
     assert kinds.get('worker') is None
-
-
-def test_the_part_of_a_host_starts_anew_when_an_address_it_looks_for_changes(tmp_path):
-    snapshots = []
-    for address in ('10.0.0.2', '10.0.0.3'):
-        path = tmp_path / 'robot.yaml'
-        path.write_text(
-            f'version: 1\nnetwork: peers\nhosts: {{a: {{address: a}}, b: {{address: {address}}}}}\n'
-            'nodes: {n: {host: a}}'
-        )
-        system = load_system(path)
-        whole = Snapshot(system.spec, system.positions, {}, {}, {}, {})
-        part = Snapshot(system.spec.on_host('a'), system.positions, {}, {}, {}, {})
-        snapshots.append((whole, part))
-    (whole, part), (new_whole, new_part) = snapshots
-    assert not compare(whole, new_whole)
-    assert find_new_start(part, new_part).changes[0].key == 'hosts.b'
-
-
-def test_a_system_with_workers_and_hosts_is_described_in_full(tmp_path):
-    path = tmp_path / 'robot.yaml'
-    path.write_text(
-        SYSTEM + 'hosts: {base: {address: 10.0.0.2}}\nnetwork: {domain_id: 3, server: base}\n'
-    )
-    system = load_system(path)
-    snapshot = Snapshot(system.spec.on_host(''), system.positions, {}, {}, {}, {})
-    decoded = decode_snapshot(json.loads(json.dumps(encode_snapshot(snapshot))))
-    assert str(decoded.spec.workers['vision'].environment['OMP']).startswith('<left out: ')
-    assert replace(decoded.spec, workers=snapshot.spec.workers) == snapshot.spec

@@ -140,7 +140,7 @@ def test_an_editor_composer_and_the_validator_have_the_same_verdict(tmp_path):
         return {(tuple(each.absolute_path), each.message) for each in validator.iter_errors(data)}
 
     @settings(
-        max_examples=35, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+        max_examples=20, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
     )
     @given(documents())
     def agree(data):

@@ -155,7 +155,7 @@ def test_an_editor_composer_and_both_validators_have_the_same_verdict():
     verdicts = []
 
     @settings(
-        max_examples=45, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
+        max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
     )
     @given(documents())
     def agree(data):
