@@ -90,6 +90,23 @@ def test_a_running_system_answers(compose, composer, monkeypatch):
     assert row.startswith('system  running  ')
     assert row.split()[-3:] == [socket.gethostname(), str(child.pid), str(path)]
 
+    message = (
+        f"error: system 'system' (pid {child.pid}) does not write to a file\n"
+        "  help: 'composer up --detach' writes to a file\n"
+    )
+    assert composer('logs', 'system') == (1, '', message)
+
+    os.kill(child.pid, signal.SIGSTOP)
+    try:
+        code, _, errors = composer('reload', 'system')
+        listed = composer('ps')[1]
+    finally:
+        os.kill(child.pid, signal.SIGCONT)
+    message = f"error: system 'system' (pid {child.pid}) does not answer\n"
+    assert (code, errors) == (1, message)
+    told = ['?', 'no', 'answer', socket.gethostname(), str(child.pid)]
+    assert listed.splitlines()[1].split() == told
+
     # As on a host that cannot look up the others now.
     monkeypatch.setenv('ROS_STATIC_PEERS', 'no-such-host.invalid;127.0.0.1')
     code, output, _ = composer('ps', '--format', 'json')
@@ -223,22 +240,6 @@ def test_a_behaviour_that_hangs_stops_no_answer(compose, composer, peer, wait_fo
     code, _, errors = composer('restart', 'stuck')
     assert code == 1
     assert errors == "system: node 'stuck' hangs, and is left as it is: subscription 'trigger'\n"
-
-
-def test_a_system_that_cannot_answer_is_told_of(compose, composer):
-    child = compose(SYSTEM, CODE)
-    child.wait_until_ready()
-    os.kill(child.pid, signal.SIGSTOP)
-    try:
-        code, _, errors = composer('reload', 'system')
-        listed = composer('ps')[1]
-    finally:
-        os.kill(child.pid, signal.SIGCONT)
-    assert code == 1
-    assert errors == f"error: system 'system' (pid {child.pid}) does not answer\n"
-    assert listed.splitlines()[1].split() == [
-        *('?', 'no', 'answer', socket.gethostname(), str(child.pid))
-    ]
 
 
 def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):

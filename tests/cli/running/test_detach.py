@@ -96,13 +96,3 @@ def test_an_interrupt_ends_what_has_not_come_up(compose, wait_for):
     wait_for(lambda: any('logged never' in text for text in said()), 'its start')
     assert child.stop(once_up=False) == 130
     assert run(['down', '--timeout', '1']) == 1
-
-
-def test_a_log_that_is_no_file_is_told_of(compose, capfd):
-    child = compose(SYSTEM, CODE)
-    child.wait_until_ready()
-    assert run(['logs', 'system']) == 1
-    assert capfd.readouterr()[1] == (
-        f"error: system 'system' (pid {child.pid}) does not write to a file\n"
-        "  help: 'composer up --detach' writes to a file\n"
-    )
