@@ -5,7 +5,6 @@ import pytest
 pytest.importorskip('rclpy')
 
 from composer.cli.main import run as composer
-from tests.running import Child
 
 pytestmark = pytest.mark.ros
 
@@ -133,20 +132,14 @@ def project(tmp_path):
     return tmp_path
 
 
-def run(name, folder, domain_id):
-    child = Child(['test', name], folder, domain_id, folder / 'log')
-    try:
-        return child.wait(), child.output
-    finally:
-        child.end()
-
-
-def test_faults_do_what_they_say(project, domain_id):
-    code, output = run('faults.scenario.yaml', project, domain_id)
+def test_faults_do_what_they_say(project, monkeypatch, capfd):
+    monkeypatch.chdir(project)
+    code = composer(['test', 'faults.scenario.yaml'])
+    output = capfd.readouterr().out
     assert code == 0, output
     assert '8 passed' in output
-    code, output = run('wrong.scenario.yaml', project, domain_id)
-    assert code == 1
+    assert composer(['test', 'wrong.scenario.yaml']) == 1
+    output = capfd.readouterr().out
     assert "node '/talker' does not run" in output
     assert "node '/talker' runs" in output
     assert 'wrong.scenario.yaml:7' in output

@@ -4,8 +4,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.cli.main import run as composer
 from tests.recorded import write_recording
-from tests.running import Child
 
 pytestmark = pytest.mark.ros
 
@@ -109,20 +109,14 @@ def project(tmp_path):
     return tmp_path
 
 
-def run(command, folder, domain_id):
-    child = Child(command, folder, domain_id, folder / 'log')
-    try:
-        return child.wait(), child.output
-    finally:
-        child.end()
-
-
-def test_cases_stand_for_devices(project, domain_id):
+def test_cases_stand_for_devices(project, monkeypatch, capfd):
     from std_msgs.msg import String
 
     recorded = {'/fix': [String(data='one'), String(data='two')], '/other': [String()]}
     write_recording(project / 'tests' / 'gps.mcap', recorded)
-    code, output = run(['test', 'tests'], project, domain_id)
+    monkeypatch.chdir(project)
+    code = composer(['test', 'tests'])
+    output = capfd.readouterr().out
     assert code == 0, output
     assert '4 passed' in output
 
@@ -140,8 +134,6 @@ def test_cases_stand_for_devices(project, domain_id):
     ],
 )
 def test_what_is_not_there_is_a_finding(project, given, expected, monkeypatch, capsys):
-    from composer.cli.main import run as composer
-
     monkeypatch.chdir(project)
     path = project / 'tests' / 'bad.scenario.yaml'
     case = f'{{given: {{{given}}}, then: [{{topic: /fix, count: 0}}]}}'
