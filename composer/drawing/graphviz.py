@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import html
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -85,7 +86,7 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
     separation, fonts = _RANK_SEPARATIONS[direction], f'fontname="{_FONT}", fontsize=11'
     hurry = _HURRIED if len(picture.nodes) > _MOST_NODES else ''
     lines = [
-        f'digraph {_quote(picture.name)} {{',
+        f'digraph {json.dumps(picture.name, ensure_ascii=False)} {{',
         f'  graph [{hurry}rankdir={direction}, ranksep={separation}, nodesep=0.2, {fonts}]',
         f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
         f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
@@ -133,11 +134,6 @@ def _font(line: str, colour: str) -> str:
 def _text(text: str) -> str:
     # A backslash begins an escape in these labels, too.
     return html.escape(text.replace('\\', '\\\\'))
-
-
-def _quote(text: str) -> str:
-    escaped = text.replace('\\', '\\\\').replace('"', '\\"').replace('\n', ' ')
-    return f'"{escaped}"'
 
 
 def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
