@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from composer.errors import ComposerError, ExitCode
+from composer.errors import ComposerError, ExitCode, UsageError
 from composer.page.drawn_parts import draw_files
 from composer.page.looks import (
     Recording,
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 
     from composer.application.running_systems.client import Client
 
+_LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 _HEADERS = {
     'cache-control': 'no-store',
     'content-security-policy': (
@@ -90,6 +91,7 @@ class PageOptions:
 
     Attributes:
         port: 0 for any that is free.
+        listen: The address; another one than this computer's own is refused.
         opens: Whether to open a browser, where there is a desktop.
         allows_changes: Whether the page may change the system.
         editor: The address of a line in an editor, with `{file}` and `{line}`; empty for none.
@@ -97,6 +99,7 @@ class PageOptions:
     """
 
     port: int = 0
+    listen: str = '127.0.0.1'
     opens: bool = False
     allows_changes: bool = False
     editor: str = ''
@@ -119,9 +122,13 @@ def serve(
         set_values: Of the file.
 
     Raises:
-        UsageError: The words fit no file.
+        UsageError: The address is another one's, or the words fit no file.
         ComposerError: There is no such file, the port is taken, or the extra `page` is missing.
     """
+    if options.listen not in _LOOPBACK:
+        message = 'the page is served to this computer alone: it is not encrypted'
+        advice = "ssh -L 8080:127.0.0.1:8080 HOST 'composer page --port 8080 --no-browser'"
+        raise UsageError(message, help=f'tunnel it: {advice}')
     drawing = draw_files(paths, words, set_values) if paths else None
     server = PageServer(WatchedSystem(name, drawing), options)
     click.echo(

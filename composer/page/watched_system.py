@@ -34,6 +34,8 @@ _SNAPSHOT_SEC = 30.0
 # How often what seldom changes is asked for, in seconds.
 _STATUS_PERIOD_SEC = 2.0
 _POLL_SEC = 0.1
+# How much longer than a look at all topics the pause after it is.
+_PAUSES = 9.0
 # Who has asked so recently looks at the answer.
 _LOOK_SEC = 5.0
 # While nobody looks, it is asked as seldom, and not for its health, which it would measure.
@@ -73,6 +75,7 @@ class WatchedSystem:
         self._saved: SavedFiles | None = None
         self._numbers = count(1)
         self._outside: dict[str, list[dict[str, str]]] = {}
+        self._next_outside = 0.0
         self._ended = Event()
         self._thread = Thread(target=self._run, name='composer-page', daemon=True)
         # What is asked, as a reload, may take long: what is watched stays fresh meanwhile.
@@ -208,13 +211,16 @@ class WatchedSystem:
         self._note_drawing(problem)
 
     def _find_outside(self, client: Client, said: dict[str, Any]) -> None:
-        if (drawing := self.drawing) is not None:
+        begun = monotonic()
+        if (drawing := self.drawing) is not None and begun > self._next_outside:
             own = {*said['nodes'], *said['components'], *drawing.nodes}
             outside = find_outside(client.node, drawing.topics, own)
             if outside != self._outside:
                 self._outside = outside
                 drawing.show_outside(outside)
                 self._note_drawing()
+            # Each topic is asked for: of a large graph, in a tenth of the time at most.
+            self._next_outside = monotonic() + _PAUSES * (monotonic() - begun)
 
     def _note_drawing(self, problem: str = '') -> None:
         number = self.state['drawing'] + 1

@@ -84,21 +84,22 @@ def test_others_on_the_same_topic_are_recorded_too_and_nothing_twice(
 
     child = compose(SYSTEM, CODE, '--record', 'run.mcap', '--topics', '/numbers')
     child.wait_until_ready()
-    publisher = peer.advertise(String, '/numbers')
+    # No queue is full before a crowded machine looks at it.
+    publisher = peer.advertise(String, '/numbers', 1000)
     # The echo, and the recorder that has found it.
     wait_for(lambda: publisher.get_subscription_count() == 2, 'the recorder')
     shown = show_deliveries()
     assert '"local"' in shown
     assert 'outside' not in shown
     # From now on, own messages are sent: to somebody outside.
-    heard = peer.listen(String, '/numbers')
+    heard = peer.listen(String, '/numbers', 1000)
     wait_for(lambda: numbers_of(each.data for each in heard), 'what is sent')
 
     def count():
         return len(numbers_of((each.data for each in heard), 'other'))
 
     for number in range(200):
-        # Queues hold ten.
+        # That of the echo holds ten.
         wait_for(lambda: count() > number - 5, 'the last ones')  # noqa: B023
         peer.run(publisher.publish, String(data=f'other {number}'))
     wait_for(lambda: count() == 200, 'all of them')

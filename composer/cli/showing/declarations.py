@@ -72,6 +72,9 @@ def show_command(
 @click.option(
     '--port', type=click.IntRange(0, 65535), default=0, help='Default: one that is free.'
 )
+@click.option(
+    '--listen', default='127.0.0.1', metavar='ADDRESS', help='Only this computer may be.'
+)
 @click.option('--no-browser', 'opens', flag_value=False, default=True, help='Only print it.')
 @click.option(
     '--allow-changes',
@@ -87,11 +90,12 @@ def show_command(
     help="What a place in a file links to; '' for no links.",
 )
 @click.option('--ends-with-input', is_flag=True, hidden=True)
-def page_command(
+def page_command(  # noqa: PLR0913 - one for each option
     words: tuple[str, ...],
     set_values: tuple[str, ...],
     *,
     port: int,
+    listen: str,
     opens: bool,
     allows_changes: bool,
     editor: str,
@@ -101,8 +105,7 @@ def page_command(
 
     The page shows what is wrong, the graph, the nodes with their figures, parameters and log, and
     the text of the files. If only one system runs, it need not be named. Only this computer can
-    open it, by the address that is printed. From another one, tunnel it, as by
-    ssh -L 8080:127.0.0.1:8080 HOST 'composer page --port 8080 --no-browser'.
+    open it, by the address that is printed.
     """
     from composer.page.server import PageOptions, serve
 
@@ -114,7 +117,7 @@ def page_command(
         paths,
         arguments,
         set_values,
-        PageOptions(port, opens, allows_changes, editor, ends_with_input),
+        PageOptions(port, listen, opens, allows_changes, editor, ends_with_input),
     )
 
 
