@@ -173,6 +173,9 @@ def lay_out(text: str) -> str:
     except subprocess.TimeoutExpired as error:
         message = f'Graphviz found no layout in {_LIMIT_SEC:g} s'
         raise ComposerError(message, help='draw it as dot, and lay that out otherwise') from error
+    except OSError as error:
+        message = f'cannot run Graphviz: {error.strerror}'
+        raise ComposerError(message, help=_MISSING_HELP) from error
     svg = done.stdout.decode(errors='replace')
     if done.returncode or '</svg>' not in svg:
         said = done.stderr.decode(errors='replace').strip().rpartition('\n')[2]
