@@ -93,7 +93,7 @@ class Recording:
 
     Attributes:
         target: What is written now; empty if nothing is.
-        told: What was said of it last.
+        told: What was said of it.
     """
 
     def __init__(self) -> None:
@@ -131,13 +131,14 @@ class Recording:
         if self._recorder is None:
             message = 'nothing is recorded'
             raise ComposerError(message)
+        self.told = ''
         self._recorder.stop()
         self._recorder, self.target = None, ''
         return self.told
 
     def info(self, message: str) -> None:
-        """Note what is said."""
-        self.told = message
+        """Note what is said: at the end what was recorded, and then what was not."""
+        self.told = f'{self.told}; {message}' if self.told else message
 
     warning = error = info
 

@@ -22,6 +22,7 @@ pytest.importorskip('uvicorn')
 from composer.application.running_systems.health import read_health
 from composer.cli.main import run
 from composer.page import watched_system
+from composer.page.looks import Recording
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
 from tests.running import DEADLINE_SEC, wait_for
@@ -258,6 +259,15 @@ def test_it_records(acting):
     assert 'recorded' in acting.act({'action': 'end_record'})[1]['text']
     assert (target / 'metadata.yaml').is_file()
     assert acting.json('/api/state')['recording']['target'] == ''
+
+
+def test_the_end_of_a_recording_says_what_was_not_recorded_too():
+    recording = Recording()
+    recording.info("recorded 3 messages of 1 topic to 'a'")
+    recording.error('the disk was too slow: 2 more were not recorded')
+    assert recording.told == (
+        "recorded 3 messages of 1 topic to 'a'; the disk was too slow: 2 more were not recorded"
+    )
 
 
 def test_what_a_saved_edit_would_do_is_shown_before_it_is_done(acting, shared_compose):
