@@ -133,15 +133,15 @@ class Drawing:
             self._fold.cache_clear()
 
     def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
-        # Graphviz has another process for each.
         with ThreadPoolExecutor() as pool:
+            # Graphviz has another process for each, and takes as long as the rest.
             layouts = pool.map(partial(render_svg, self._picture, folded), self._directions)
-            documents = dict(zip(self._directions, map(_inlined, layouts), strict=True))
+            drawn = arrange_shapes(self._picture, folded)
+            parts = dict(_parts(self._picture, self._code))
+            parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
+            parts |= dict(_bundles(drawn, parts))
+        documents = dict(zip(self._directions, map(_inlined, layouts), strict=True))
         self._directions = [min(documents, key=lambda each: _shrinkage(documents[each]))]
-        drawn = arrange_shapes(self._picture, folded)
-        parts = dict(_parts(self._picture, self._code))
-        parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
-        parts |= dict(_bundles(drawn, parts))
         owners = {index: token for token in reversed(parts) for index in parts[token]['findings']}
         findings = [
             {**describe_finding(finding), 'part': owners.get(index)}
