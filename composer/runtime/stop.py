@@ -31,8 +31,11 @@ def limit_stop(spec: SystemSpec, *, ends_process: bool) -> float:
     Args:
         ends_process: Whether the process exits afterwards, and destroys no nodes before.
     """
-    destruction_sec = 0.0 if ends_process else len(spec.nodes) ** 2 * _DESTRUCTION_SEC
-    return spec.longest_stop_sec + _MARGIN_SEC + destruction_sec
+    last_sec = len(spec.nodes) ** 2 * _DESTRUCTION_SEC
+    if ends_process:
+        # What behaviours have started and left gets as much time as they themselves.
+        last_sec = spec.shutdown_timeout_sec
+    return spec.longest_stop_sec + last_sec + _MARGIN_SEC
 
 
 def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:

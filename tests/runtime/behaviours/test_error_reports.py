@@ -44,7 +44,8 @@ def test_an_error_is_logged_with_node_entity_place_and_traceback_and_others_go_o
             timers:
               live: {period: 0.02, behaviour: 'parts:live'}
     """
-    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    # The lines of the others may come in front of it, all at once.
+    latched = QoSProfile(depth=10_000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     heard = peer.listen(Log, '/rosout', latched)
     child = compose(text, CODE)
     first = child.wait_for_line('[ERROR] [deep.bad]')

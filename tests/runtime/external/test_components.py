@@ -239,8 +239,8 @@ def test_a_container_that_runs_elsewhere_gets_components_and_loses_only_these(
     os.kill(container_of(other), signal.SIGKILL)
     child.wait_for_line("container '/elsewhere': 1 component was loaded again")
     other.wait_for_line("container 'elsewhere': 1 component was loaded again")
-    assert child.stop() == 0
-    assert list(listed('/elsewhere').values()) == ['/own']
+    assert child.stop() == 0, child.output
+    wait_for(lambda: list(listed('/elsewhere').values()) == ['/own'], 'its end')
     assert other.stop() == 0
 
 
