@@ -10,7 +10,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from composer.language.pipeline import load_system_text
 from composer.processes import guardian
+from composer.runtime.stop import limit_stop
 from tests.running import DEADLINE_SEC, ROOT, descendants, is_there
 
 pytestmark = pytest.mark.ros
@@ -223,6 +225,18 @@ def test_processes_of_behaviours_of_a_worker_end_with_the_system(compose):
         assert child.matching(f'process {pid} (')
     assert len(child.matching('which a behaviour has started, still runs')) >= STARTED
     assert not child.matching('resource_tracker')
+
+
+def test_a_stop_may_take_as_long_as_all_that_gets_time_in_it():
+    text = """
+version: 1
+executor: {shutdown_timeout: 60}
+nodes: {n: {}}
+processes: {p: {command: [sleep, '9'], stop: {timeout: 30}}}
+"""
+    spec = load_system_text(text).spec
+    # Callbacks, then processes, then what behaviours have started and left.
+    assert limit_stop(spec, ends_process=True) > 60 + 30 + 60
 
 
 def test_processes_of_behaviours_that_do_not_end_are_killed(compose):
