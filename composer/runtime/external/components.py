@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 from functools import partial
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rclpy.logging import LoggingSeverity
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 
 OnLoad: TypeAlias = 'Callable[[ExternalProcess, ComponentSpec, Callable[[], bool]], None]'
 _NODE_NAME = '_composer_components'
-_STOP_SEC = 1.0
+# How long containers that run elsewhere may take, all together, as Composer stops.
+_STOP_SEC = 3.0
 _POLL_SEC = 0.05
 # How often is looked whether a container that runs elsewhere is another one.
 _LOOK_SEC = 1.0
@@ -250,11 +252,12 @@ class Components:
     def stop(self) -> None:
         """Unload what was loaded into containers that are not ours, and ask them no more."""
         self._stopping.set()
+        deadline = monotonic() + _STOP_SEC
         with self._lock:
             for process in {each.process for each in self._loaded.values()}:
-                self.release(process, _STOP_SEC)
+                self.release(process, deadline - monotonic())
             for client in self._clients.values():
-                client.settle(_STOP_SEC)
+                client.settle(deadline - monotonic())
         if self._watcher is not None:
             self._watcher.join()
         if self._executor is not None:
