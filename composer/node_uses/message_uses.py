@@ -28,14 +28,6 @@ if TYPE_CHECKING:
     from composer.node_uses.reading import MessageUse, Reading, Wire
     from composer.python_source.modules import ModuleSource
 
-_PYTHON_TYPES: dict[str, type] = {
-    'bool': bool,
-    'byte': bytes,
-    'float32': float,
-    'float64': float,
-    'string': str,
-    'wstring': str,
-}
 _INDEX = re.compile(r'\[(\d+)\]')
 _OF_CLASSES = ('get_fields_and_field_types', 'SLOT_TYPES')
 # Of types, type checkers know.
@@ -216,7 +208,7 @@ def _find_problem(
             return None
         if found.nested and not found.array:
             found = types.describe(found.nested)
-    return _never_equal(found, use) if isinstance(found, FieldType) else None
+    return None
 
 
 def _wrong_index(array: FieldType, name: str, use: MessageUse) -> Problem | None:
@@ -227,21 +219,6 @@ def _wrong_index(array: FieldType, name: str, use: MessageUse) -> Problem | None
     text = f'there is no item {match[1]}: this has {bound}, from 0 to {bound - 1}'
     index = next(each for each in ast.walk(use.node) if isinstance(each, ast.Subscript)).slice
     return Problem('bad-index', text, use.module.span_of(index))
-
-
-def _never_equal(field_type: FieldType, use: MessageUse) -> Problem | None:
-    """Return that a field is compared with a constant of a type that it never has."""
-    match use.compared:
-        case ast.Compare(comparators=[ast.Constant(value=value)]) as compared if (
-            value is not None and value is not ... and not field_type.array
-        ):
-            own, other = _PYTHON_TYPES.get(field_type.kind, int), type(value)
-            if own is not other and not {own, other} <= {bool, int, float}:
-                text = (
-                    f'values of these types are never equal: {own.__name__} and {other.__name__}'
-                )
-                return Problem('never-equal', text, use.module.span_of(compared))
-    return None
 
 
 def explain_unknown(

@@ -185,7 +185,6 @@ class MessageUse:
     Attributes:
         path: The names and indices that lead to it: `('poses', '[0]', 'position')`.
         of_type: The type of a message that the code makes; `None` for the one that is given.
-        compared: The comparison with a constant that it is a part of.
         is_certain: Whether the file does not decide on it.
         value: What is stored there.
     """
@@ -194,7 +193,6 @@ class MessageUse:
     node: ast.expr
     module: ModuleSource
     is_write: bool = False
-    compared: ast.Compare | None = None
     is_certain: bool = True
     of_type: str | None = None
     value: ast.expr | None = None

@@ -650,9 +650,6 @@ class Walk:
                     self.need(operand, scope)
             case ast.Compare(ops=[ast.Eq() | ast.NotEq()], comparators=[ast.Constant()]):
                 left = self._names.value_of(node.left, scope)
-                if isinstance(left, Chain) and left.path[0] in ('message', 'made'):
-                    self._use_message(left, node.left, scope, node)
-                    return
                 match left, operands[1]:
                     case Chain(path=('goal', _, 'status')), ast.Constant(value=value) as other:
                         if value not in GOAL_STATUSES:
@@ -744,9 +741,7 @@ class Walk:
         help_text = f'did you mean node.set_parameters(node.name, {{{name!r}: …}})?'
         self.run.report('unset-parameter', scope.module, node, text, help_text)
 
-    def _use_message(
-        self, chain: Chain, node: ast.expr, scope: Scope, compared: ast.Compare | None = None
-    ) -> None:
+    def _use_message(self, chain: Chain, node: ast.expr, scope: Scope) -> None:
         run = self.run
         is_write = not isinstance(getattr(node, 'ctx', None), ast.Load)
         of_type = chain.path[1] if chain.path[0] == 'made' else None
@@ -754,7 +749,7 @@ class Walk:
         is_guarded = run.guards or run.broad_guards or run.fixed
         if path and (is_write or not is_guarded):
             value, certain = self._stored.get(id(node)), not run.doubts
-            use = MessageUse(path, node, scope.module, is_write, compared, certain, of_type, value)
+            use = MessageUse(path, node, scope.module, is_write, certain, of_type, value)
             run.reading.message_uses.append(use)
         for inner in ast.walk(node):
             if isinstance(inner, ast.Subscript):
@@ -821,7 +816,7 @@ class Walk:
                     if each.arg and not (self.run.guards or self.run.broad_guards):
                         path, value, certain = (each.arg,), each.value, not self.run.doubts
                         use = MessageUse(
-                            path, value, scope.module, True, None, certain, interface, value
+                            path, value, scope.module, True, certain, interface, value
                         )
                         self.run.reading.message_uses.append(use)
             case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):

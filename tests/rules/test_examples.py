@@ -16,6 +16,8 @@ from composer.rules.examples import load_example
 from composer.runtime.behaviours.import_check import ImportCheck
 from composer.scenarios.checks import check_scenarios
 from composer.scenarios.scenario_files import load_scenarios
+from composer.stubs.checking.kept_types import TypesCheck
+from composer.stubs.checking.type_checker import find_program
 from tests.rules.applied_helps import ELSEWHERE, FOR_PEOPLE, apply, read_help
 
 WITHOUT = {
@@ -39,6 +41,7 @@ WITHOUT = {
     'bad-syntax',
 }
 ONLY_WHEN_IMPORTED = {'broken-behaviour'}
+ONLY_WITH_TYPES = {'never-equal'}
 
 EXAMPLES = [
     pytest.param(
@@ -63,7 +66,9 @@ def find(rule, kind):
     """Return what is found in an example, whose files are in this folder."""
     if load_rule(rule).family == 'scenarios':
         return check_scenarios(load_scenarios(Path(f'{kind}.yaml')), InterfaceCatalogue())
-    further = {'import': ImportCheck()} if rule in ONLY_WHEN_IMPORTED else None
+    further = {'import': ImportCheck()} if rule in ONLY_WHEN_IMPORTED else {}
+    if rule in ONLY_WITH_TYPES:
+        further['types'] = TypesCheck(find_program())
     ((_, system),) = load_combinations(Path(f'{kind}.yaml'))
     return check_system(system, InterfaceCatalogue(), further)
 
