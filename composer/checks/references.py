@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from composer.ament import explain_missing_package, has_content_filters
+from composer.checks.behaviours.shipped_behaviours import is_shipped
 from composer.diagnostics import diagnostic_at
 from composer.errors import ComposerError
 from composer.interfaces.descriptions import MessageDescription
@@ -15,7 +16,6 @@ from composer.language.paths import PathError, explain_absent, resolve_path
 from composer.language.qos import BUILTIN_PROFILES, QosError, resolve_qos
 from composer.language.values.start_reader import read_from_file
 from composer.programs import base_environment, find_program_problem, shell_environment
-from composer.python_source.return_values import passes_message_on
 from composer.spelling import suggest
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from composer.yaml_text.positions import DataPath
 
 
+# Behaviours that come with Composer, and publish messages as they were received.
+_PASSING = frozenset(f'behaviours.topics:{name}' for name in ('drop', 'mux', 'relay', 'throttle'))
 _KIND_NOUNS = {'msg': 'message', 'srv': 'service', 'action': 'action'}
 
 
@@ -76,12 +78,11 @@ def _check_relays(context: CheckContext, node: NodeSpec) -> Iterator[Diagnostic]
 def _passes_on(
     context: CheckContext, subscription: SubscriptionSpec, publisher: PublisherSpec
 ) -> bool:
-    """Return whether messages are published as they were received."""
+    """Return whether messages are published as they were received, and not by the project."""
     behaviour = subscription.behaviour
     if behaviour is None:
         return not context.was_dropped((*subscription.path, 'behaviour'))
-    source = context.modules.find_function(behaviour.module, behaviour.function)
-    if source is None or source.definition is None or not passes_message_on(source.definition):
+    if behaviour.name not in _PASSING or not is_shipped(context, behaviour.module):
         return False
     # A message can be the only field of another one.
     published = context.catalogue.describe(publisher.type)

@@ -1,4 +1,4 @@
-"""Find out whether a function always returns a value, or the message that it is given."""
+"""Find out whether a function always returns a value."""
 
 from __future__ import annotations
 
@@ -50,22 +50,8 @@ def always_answers(function: FunctionNode) -> bool:
     return ends and all(_is_value(each.value, sure) for each in _returns(function))
 
 
-def passes_message_on(function: FunctionNode) -> bool:
-    """Return whether a function returns its second parameter, a message, as it is."""
-    message = _message_of(function)
-    if not message or message in stored_names(function):
-        return False
-    return any(_may_be(answer.value, message) for answer in _returns(function))
-
-
 def _message_of(function: FunctionNode) -> str:
     return next(iter(positional_names(function)[1:]), '')
-
-
-def _may_be(answer: ast.expr | None, name: str) -> bool:
-    if isinstance(answer, ast.IfExp):
-        return _may_be(answer.body, name) or _may_be(answer.orelse, name)
-    return isinstance(answer, ast.Name) and answer.id == name
 
 
 def _returns(function: FunctionNode) -> list[ast.Return]:

@@ -82,6 +82,20 @@ def test_what_two_checks_find_is_said_once(typed, capsys):
         assert sum('scaling.py' in line and rule in line for line in out.splitlines()) == 1, out
 
 
+def test_a_message_that_is_passed_on_to_another_type_is_found(typed):
+    Path('passing.py').write_text('def hear(node, m):\n    return m if m.data else None\n')
+    Path('passing.yaml').write_text(
+        'version: 1\nnodes:\n  n:\n'
+        '    publishers: {out: {type: std_msgs/msg/Int32, external: true}}\n'
+        '    subscriptions:\n'
+        '      text: {type: std_msgs/msg/String, external: true, behaviour: passing:hear, '
+        'publish: out}\n'
+    )
+    (finding,) = find_by_types(Path('passing.yaml'))
+    assert (finding.span.line, finding.rule) == (2, 'field-type')
+    assert finding.message.endswith('expected int32, got std_msgs/msg/String')
+
+
 def test_pyrefly_checks_a_right_system_again_only_after_a_change(typed, monkeypatch):
     clean = Path('behaviour.py')
     clean.write_text("def tick(node):\n    node.publish('status', 'on')\n")

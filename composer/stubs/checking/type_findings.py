@@ -400,7 +400,8 @@ class TypeFindings:
         match = _RETURNED.search(place.report.message)
         if full_name is None or match is None or match[1] == 'None' or not place.values:
             return None
-        return self._payload(full_name, place.values[0], match[1])
+        # `None` publishes nothing.
+        return self._payload(full_name, place.values[0], match[1].removesuffix(' | None'))
 
     def _payload(self, full_name: str, value: ast.expr, given: str) -> _Problem | None:
         """Return what keeps a payload from becoming a message."""
