@@ -1,12 +1,14 @@
-"""Finds the node, channel or end that a finding is about, by its place in the file."""
+"""Marks the node, channel or end that a finding is about; its place in the file tells which."""
 
 from __future__ import annotations
 
+import textwrap
 from collections import defaultdict
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.entity_kinds import BEHAVIOUR_KEYS, ENTITY_KINDS
 from composer.rules import Severity, load_rule
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -23,26 +25,51 @@ _OF_CHANNELS = {kind.unmatched[0] for kind in ENTITY_KINDS if kind.unmatched}
 _OF_BEHAVIOURS = BEHAVIOUR_KEYS | {'group', 'on_error', 'publish', 'with'}
 # Of the paths of `nodes: {<name>: {<section>: {<entity>: …}}}`.
 _NODE, _ENTITY = 2, 4
+_REMARK_WIDTH = 44
+# Of a part with more findings, the rest is counted.
+_MOST_REMARKS = 2
 
 
-def place_findings(
-    positions: SourceMap, topology: Topology, findings: Sequence[Diagnostic]
-) -> dict[DataPath, tuple[int, ...]]:
-    """Return the findings of each part of a system, as indices into the list of all.
+class Marks:
+    """The findings of each part of a system, given out in the order in which parts are drawn."""
 
-    A node, a process or an end has its path as the key, a channel its kind and its name.
-    """
-    lines = defaultdict(list)
-    for path, span in (*positions.keys.items(), *positions.values.items()):
-        if path[:1] in (('nodes',), ('processes',)) and len(path) >= _NODE:
-            lines[span.source, span.line].append((span, path))
-    channels = {end.path: each for each in topology.channels.values() for end in each.ends}
-    # The keys of a dictionary, as one finding may be at a part several times.
-    places: dict[DataPath, dict[int, None]] = defaultdict(dict)
-    for index, finding in enumerate(findings):
-        for part in _find_parts(finding, lines, channels):
-            places[part][index] = None
-    return {part: tuple(indices) for part, indices in places.items()}
+    def __init__(
+        self, positions: SourceMap, topology: Topology, findings: Sequence[Diagnostic]
+    ) -> None:
+        self._findings = findings
+        self._told: set[int] = set()
+        lines = defaultdict(list)
+        for path, span in (*positions.keys.items(), *positions.values.items()):
+            if path[:1] in (('nodes',), ('processes',)) and len(path) >= _NODE:
+                lines[span.source, span.line].append((span, path))
+        channels = {end.path: each for each in topology.channels.values() for end in each.ends}
+        # The keys of a dictionary, as one finding may be at a part several times.
+        self._places: dict[DataPath, dict[int, None]] = defaultdict(dict)
+        for index, finding in enumerate(findings):
+            for part in _find_parts(finding, lines, channels):
+                self._places[part][index] = None
+
+    def at(self, key: DataPath) -> dict[str, Any]:
+        """Return `findings`, `remarks` and `mark` of a part: a message is only shown once.
+
+        Args:
+            key: The path of a node, a process or an end; the kind and the name of a channel.
+        """
+        indices = tuple(self._places.get(key, ()))
+        fresh = [self._findings[index] for index in indices if index not in self._told]
+        self._told.update(indices)
+        remarks = [
+            line
+            for finding in fresh[:_MOST_REMARKS]
+            for line in textwrap.wrap(
+                f'{finding.severity.value}: {escape(finding.message)}', _REMARK_WIDTH
+            )
+        ]
+        if (rest := len(fresh) - _MOST_REMARKS) > 0:
+            remarks.append(f'and {rest} more')
+        # `error` is before `warning`.
+        mark = min((self._findings[index].severity.value for index in indices), default='')
+        return {'findings': indices, 'remarks': tuple(remarks), 'mark': mark}
 
 
 def _find_parts(

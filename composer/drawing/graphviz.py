@@ -17,15 +17,16 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from composer.drawing.shapes import arrange_shapes
+from composer.drawing.picture import Box
+from composer.drawing.shapes import arrange
 from composer.errors import ComposerError
 from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
-    from composer.drawing.picture import Picture
-    from composer.drawing.shapes import Region, Shape
+    from composer.drawing.picture import Part, Picture
+    from composer.drawing.shapes import Region
 
 _FONT = 'Helvetica,Arial,sans-serif'
 _SHAPES = {
@@ -79,10 +80,10 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
     """Return a picture as a directed graph; each element has an `id` and a `class` for SVG.
 
     Args:
-        folded: See `arrange_shapes`.
+        folded: See `arrange`.
         direction: Of messages, as Graphviz names it: `LR` or `TB`.
     """
-    drawn = arrange_shapes(picture, folded)
+    drawn = arrange(picture, folded)
     separation, fonts = _RANK_SEPARATIONS[direction], f'fontname="{_FONT}", fontsize=11'
     hurry = _HURRIED if len(picture.nodes) > _MOST_NODES else ''
     lines = [
@@ -91,7 +92,10 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
         f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
         f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
         *_region(drawn.root, 1),
-        *(f'  {line.start} -> {line.end} {_look(line, _LINES)}' for line in drawn.lines),
+        *(
+            f'  {line.start.token} -> {line.end.token} {_look(line, _LINES)}'
+            for line in drawn.lines
+        ),
         '}',
     ]
     return '\n'.join(lines) + '\n'
@@ -99,9 +103,9 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
 
 def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
-    folded = [inner.as_shape() for inner in region.inner if inner.is_folded]
-    for shape in (*region.shapes, *folded):
-        yield f'{indent}{shape.token} {_look(shape, _SHAPES)}'
+    folded = [inner.as_box() for inner in region.inner if inner.is_folded]
+    for box in (*region.boxes, *folded):
+        yield f'{indent}{box.token} {_look(box, _SHAPES)}'
     for inner in (inner for inner in region.inner if not inner.is_folded):
         yield f'{indent}subgraph cluster_{inner.token} {{'
         yield (
@@ -112,17 +116,17 @@ def _region(region: Region, depth: int) -> Iterator[str]:
         yield f'{indent}}}'
 
 
-def _look(shape: Shape, styles: Mapping[str, str]) -> str:
-    """Return the attributes of a shape or a line."""
-    lines = [f'<B>{_text(shape.title)}</B>'] if shape.title else []
-    lines += [_font(line, _GREY) for line in shape.details]
-    lines += [_font(line, _MARK_COLOURS.get(shape.mark, _GREY)) for line in shape.remarks]
+def _look(part: Part, styles: Mapping[str, str]) -> str:
+    """Return the attributes of a box or a line; a line shows no name of its own."""
+    lines = [f'<B>{_text(part.name)}</B>'] if isinstance(part, Box) else []
+    lines += [_font(line, _GREY) for line in part.details]
+    lines += [_font(line, _MARK_COLOURS.get(part.mark, _GREY)) for line in part.remarks]
     attributes = [
         f'label=<{"<BR/>".join(lines)}>' if lines else '',
-        styles[shape.kind],
-        _MARKS.get(shape.mark, ''),
-        f'id="{shape.token}"',
-        f'class="{shape.kind} {shape.mark}"' if shape.mark else f'class="{shape.kind}"',
+        styles[part.kind],
+        _MARKS.get(part.mark, ''),
+        f'id="{part.token}"',
+        f'class="{part.kind} {part.mark}"' if part.mark else f'class="{part.kind}"',
     ]
     return f'[{", ".join(filter(None, attributes))}]'
 
@@ -133,25 +137,24 @@ def _font(line: str, colour: str) -> str:
 
 def _text(text: str) -> str:
     # A backslash begins an escape in these labels, too.
-    return html.escape(text.replace('\\', '\\\\'))
+    return html.escape(escape(text).replace('\\', '\\\\'))
 
 
 def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
     """Return a picture as an SVG document.
 
     Args:
-        folded: See `arrange_shapes`.
+        folded: See `arrange`.
         direction: See `render_dot`.
 
     Raises:
         ComposerError: Graphviz is missing or failed.
     """
     drawn = _COMMENT.sub('', lay_out(render_dot(picture, folded, direction)))
-    tokens = picture.tokens()
     titles = {}
     for part in picture.parts:
         said = [picture.findings[index].message for index in part.findings]
-        titles[tokens[part.id]] = '\n'.join(map(escape, [part.title, *part.facts, *said]))
+        titles[part.token] = '\n'.join(map(escape, [part.title, *part.facts, *said]))
 
     def entitle(match: re.Match[str]) -> str:
         title = titles.get(match[2])

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.drawing.shapes import arrange_shapes
+from composer.drawing.picture import Box
+from composer.drawing.shapes import arrange
+from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.drawing.picture import Picture
-    from composer.drawing.shapes import Region, Shape
+    from composer.drawing.picture import Part, Picture
+    from composer.drawing.shapes import Region
 
 _SHAPES = {
     'node': ('([', '])'),
@@ -41,11 +43,11 @@ _PLAIN = frozenset(" _/.,:()=+-'")
 
 def render_mermaid(picture: Picture) -> str:
     """Return a picture as a flowchart."""
-    drawn = arrange_shapes(picture)
+    drawn = arrange(picture)
     lines = ['flowchart LR', *_region(drawn.root, 1)]
     for line in drawn.lines:
         text = f'|"{label}"|' if (label := _label(line)) else ''
-        lines.append(f'  {line.start} {_ARROWS[line.kind]}{text} {line.end}')
+        lines.append(f'  {line.start.token} {_ARROWS[line.kind]}{text} {line.end.token}')
     marked = [(index, line.mark) for index, line in enumerate(drawn.lines) if line.mark]
     lines += [f'  linkStyle {index} {_LINE_STYLES[mark]}' for index, mark in marked]
     lines += [f'  {each}' for each in _CLASSES]
@@ -54,20 +56,23 @@ def render_mermaid(picture: Picture) -> str:
 
 def _region(region: Region, depth: int) -> Iterator[str]:
     indent = '  ' * depth
-    for shape in region.shapes:
-        opening, closing = _SHAPES[shape.kind]
-        style = f'{closing}:::{shape.mark or shape.kind}'
-        yield f'{indent}{shape.token}{opening}"{_label(shape)}"{style}'
+    for box in region.boxes:
+        opening, closing = _SHAPES[box.kind]
+        style = f'{closing}:::{box.mark or box.kind}'
+        yield f'{indent}{box.token}{opening}"{_label(box)}"{style}'
     for inner in region.inner:
         yield f'{indent}subgraph {inner.token}["{_escape(inner.title)}"]'
         yield from _region(inner, depth + 1)
         yield f'{indent}end'
 
 
-def _label(shape: Shape) -> str:
-    titles = (shape.title,) if shape.title else ()
-    return '<br/>'.join(map(_escape, (*titles, *shape.details, *shape.remarks)))
+def _label(part: Part) -> str:
+    # A line shows no name of its own.
+    names = (part.name,) if isinstance(part, Box) else ()
+    return '<br/>'.join(map(_escape, (*names, *part.details, *part.remarks)))
 
 
 def _escape(text: str) -> str:
-    return ''.join(each if each.isalnum() or each in _PLAIN else f'#{ord(each)};' for each in text)
+    return ''.join(
+        each if each.isalnum() or each in _PLAIN else f'#{ord(each)};' for each in escape(text)
+    )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import field, fields, replace
+from itertools import count
 from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -10,8 +11,8 @@ from composer.checks.connections.topology import full_name
 from composer.checks.connections.wait_conditions import waiters
 from composer.checks.placement.crossings import describe_place, place_of
 from composer.confidential import conceal, hidden_values
-from composer.drawing.delivery import deliveries_of, policies_of
-from composer.drawing.finding_places import place_findings
+from composer.drawing.delivery import OUTSIDE, Delivery, deliveries_of, policies_of
+from composer.drawing.finding_places import Marks
 from composer.entity_kinds import CHANNEL_KINDS
 from composer.language.qos import (
     BUILTIN_PROFILES,
@@ -30,138 +31,135 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.checks.placement.crossings import Place
     from composer.diagnostics import Diagnostic
-    from composer.drawing.delivery import Delivery
-    from composer.entity_kinds import ChannelKind
     from composer.language.specs import QosSpec
     from composer.yaml_text.positions import DataPath, SourceMap
 
-NodeKind: TypeAlias = Literal['node', 'process']
 Side: TypeAlias = Literal['providers', 'users']
-Places: TypeAlias = 'Mapping[DataPath, tuple[int, ...]]'
 
 # Policies whose values are clear without their names.
 _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
+# By its path a part is found in the file; messages of findings hide the values themselves.
+_NEVER_HIDDEN = {
+    'token',
+    'kind',
+    'role',
+    'path',
+    'findings',
+    'remarks',
+    'mark',
+    'external',
+    'place',
+}
 
 
 @record
-class Box:
-    """A node or process, or a topic, service or action.
+class Part:
+    """What all parts of a picture have.
+
+    Attributes:
+        token: A short name in the drawing: no keyword of a language is like it.
+        kind: `node`, `process`, `topic`, `service`, `action` or `external`; of a folded region,
+            `folded`; of what waits for something, `wait`. An edge has the kind of its channel.
+        details: Smaller lines below the name.
+        findings: As indices into those of the picture.
+        remarks: The messages of its findings, in lines; each is shown at one part.
+        mark: The worst of its findings, `error` or `warning`; empty if it has none.
+    """
+
+    token: str
+    kind: str
+    id: str = ''
+    name: str = ''
+    details: tuple[str, ...] = ()
+    path: DataPath = ()
+    findings: tuple[int, ...] = ()
+    remarks: tuple[str, ...] = ()
+    mark: str = ''
+
+
+@record
+class Box(Part):
+    """A node or process, or a topic, service or action, or what is drawn in place of these.
 
     Attributes:
         id: Its kind and full name, as in `node:/robot/arm`; no two are the same.
         name: That of a topic, service or action is full.
+        details: The types that the ends of a channel declare; more than one is an error.
+        path: Of a channel, that of the end that is declared first.
         namespace: In full, as in `/robot`; of a channel, the deepest one that has all its ends.
         place: The host and the worker that it, or all its ends, run in; empty for those that the
             file names not.
-        path: Of a channel, that of the end that is declared first.
-        findings: Its findings, as indices into those of the picture.
-        types: The types that the ends of a channel declare; more than one is an error.
         external: The sides on which an end is outside the system, by `external: true`.
     """
 
-    id: str
-    kind: NodeKind | ChannelKind
-    name: str
-    namespace: str
-    place: Place
-    path: DataPath
-    findings: tuple[int, ...]
+    namespace: str = '/'
+    place: Place = ('', '')
     description: str = ''
-    types: tuple[str, ...] = ()
     external: tuple[Side, ...] = ()
 
     @property
     def title(self) -> str:
         """Its kind and full name."""
-        return _title(self.id)
+        return self.id.replace(':', ' ', 1)
 
     @property
     def facts(self) -> list[str]:
         """What there is to say of it."""
-        place = '' if self.types else describe_place(self.place)
+        place = '' if self.details else describe_place(self.place)
         external = [
             f'external {kind.noun}s'
             for kind in CHANNEL_KINDS
             if kind.channel == self.kind
             and ('providers' if kind.provides else 'users') in self.external
         ]
-        return [*filter(None, (self.description, place)), *self.types, *external]
+        return [*filter(None, (self.description, place)), *self.details, *external]
+
+
+_NOTHING = Box('', '')
 
 
 @record
-class Edge:
+class Edge(Part):
     """A publisher, subscription, server or client: it connects a node with a channel.
 
+    Another one is drawn from what is ready to the node or process that waits for it.
+
     Attributes:
-        id: Its kind, the full name of its node, and its name, as in `publisher:/robot/arm:scan`.
-        kind: In words, as in `publisher`, `service client` and `service server`.
-        node: The id of its node or process.
-        channel: The id of its topic, service or action.
-        ends: Both, in the direction of messages, requests and goals.
+        id: Its role, the full name of its node, and its name, as in `publisher:/robot/arm:scan`.
+        start: Where messages, requests and goals come from.
+        role: In words, as in `publisher`, `service client` and `service server`; empty for others.
         qos: The policies that differ from the default of ROS; durations in seconds.
         delivery: Which way its messages, calls or goals go.
         by_parameter: The parameters that its name or depth follows, by these keys.
-        findings: Its findings, as indices into those of the picture.
     """
 
-    id: str
-    kind: str
-    name: str
-    node: str
-    channel: str
-    ends: tuple[str, str]
-    type: str
-    qos: Mapping[str, Any]
-    delivery: Delivery
-    path: DataPath
-    findings: tuple[int, ...]
-    by_parameter: Mapping[str, str]
+    start: Box = _NOTHING
+    end: Box = _NOTHING
+    role: str = ''
+    type: str = ''
+    qos: Mapping[str, Any] = field(default_factory=dict)
+    delivery: Delivery = Delivery()
+    by_parameter: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def node(self) -> Box:
+        """The end of it that is a node or process."""
+        return self.start if self.start.kind in ('node', 'process') else self.end
+
+    @property
+    def channel(self) -> Box:
+        """The end of it that is a topic, service or action."""
+        return self.end if self.node is self.start else self.start
 
     @property
     def title(self) -> str:
-        """Its kind, its name and its node."""
-        return f'{self.kind} {self.name} of {_title(self.node)}'
+        """Its role, its name and its node."""
+        return f'{self.role} {self.name} of {self.node.title}'
 
     @property
     def facts(self) -> list[str]:
         """What there is to say of it."""
-        qos = self.policies and f'QoS: {self.policies}'
-        delivery = self.delivery.way and f'delivery: {self.delivery}'
-        return [*filter(None, (self.type, qos, delivery, self.followed))]
-
-    @property
-    def policies(self) -> str:
-        """The QoS in words, as in `best_effort, depth 5, deadline 0.1 s`."""
-        return ', '.join(_describe_policy(key, value) for key, value in self.qos.items())
-
-    @property
-    def followed(self) -> str:
-        """What follows parameters, in words; empty for nothing."""
-        return ', '.join(f'{key} by parameter {name}' for key, name in self.by_parameter.items())
-
-
-def _title(id_: str) -> str:
-    return id_.replace(':', ' ', 1)
-
-
-def _describe_policy(key: str, value: Any) -> str:
-    if key in _SELF_EXPLANATORY and value not in ('system_default', 'best_available'):
-        return str(value)
-    return f'{key.replace("_", " ")} {format_policy_value(key, value)}'
-
-
-@record
-class Wait:
-    """A node or process that starts only when something else is ready.
-
-    Attributes:
-        waiter: The id of the node or process.
-        target: The id of the process or channel.
-    """
-
-    waiter: str
-    target: str
-    path: DataPath
+        return [self.type, *self.details]
 
 
 @record
@@ -173,7 +171,7 @@ class Picture:
     nodes: tuple[Box, ...]
     channels: tuple[Box, ...]
     edges: tuple[Edge, ...]
-    waits: tuple[Wait, ...]
+    waits: tuple[Edge, ...]
     findings: tuple[Diagnostic, ...]
     positions: SourceMap
 
@@ -182,30 +180,20 @@ class Picture:
         """All that may have findings."""
         return (*self.nodes, *self.channels, *self.edges)
 
-    def tokens(self) -> dict[str, str]:
-        """Return short names of the parts by their ids: no keyword of a language is like them."""
-        kinds: dict[str, Sequence[Box | Edge]]
-        kinds = {'n': self.nodes, 'c': self.channels, 'e': self.edges}
-        return {
-            part.id: f'{letter}{index}'
-            for letter, parts in kinds.items()
-            for index, part in enumerate(parts)
-        }
-
 
 def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Picture:
     """Return the picture of a system, with the findings at the parts that they are about."""
-    places = place_findings(context.system.positions, context.topology, findings)
-    nodes = tuple(_nodes(context, places))
-    ids = {node.path: node.id for node in nodes}
-    channels = tuple(_channels(context.topology, places))
+    marks = Marks(context.system.positions, context.topology, findings)
+    nodes, channels = tuple(_nodes(context, marks)), tuple(_channels(context.topology, marks))
+    boxes = {box.id: box for box in (*nodes, *channels)}
+    at = {node.path: node for node in nodes}
     picture = Picture(
         context.spec.name,
         context.spec.description,
         nodes,
         channels,
-        tuple(_edges(context, places, ids)),
-        tuple(_waits(context, {*ids.values(), *(channel.id for channel in channels)}, ids)),
+        tuple(_edges(context, marks, boxes, at)),
+        tuple(_waits(context, boxes, at)),
         tuple(findings),
         context.system.positions,
     )
@@ -226,18 +214,16 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
         return shown[value]
     if isinstance(value, tuple):
         return tuple(_concealed(each, shown) for each in value)
-    if isinstance(value, Picture | Box | Edge | Wait):
-        # By its path a part is found in the file.
-        known = {'path', 'findings', 'kind', 'external', 'place', 'positions'}
-        names = (each.name for each in fields(value) if each.name not in known)
+    if isinstance(value, Picture | Part):
+        names = (each.name for each in fields(value) if each.name not in _NEVER_HIDDEN)
         return replace(value, **{name: _concealed(getattr(value, name), shown) for name in names})
     return value
 
 
-def _nodes(context: CheckContext, places: Places) -> Iterator[Box]:
+def _nodes(context: CheckContext, marks: Marks) -> Iterator[Box]:
     taken: set[str] = set()
-    for node in waiters(context.spec):
-        kind: NodeKind = 'process' if isinstance(node, ProcessSpec) else 'node'
+    for index, node in enumerate(waiters(context.spec)):
+        kind = 'process' if isinstance(node, ProcessSpec) else 'node'
         namespace = expand_namespace(node.namespace or '')
         full = join_names(namespace, node.name) if kind == 'node' else node.name
         # Two nodes with one name are an error, and are drawn as two.
@@ -250,12 +236,21 @@ def _nodes(context: CheckContext, places: Places) -> Iterator[Box]:
             if isinstance(node, ComponentSpec)
             else (node.host, getattr(node, 'worker', ''))
         )
-        found = places.get(node.path, ())
-        yield Box(id_, kind, node.name, namespace, place, node.path, found, node.description)
+        yield Box(
+            f'n{index}',
+            kind,
+            id_,
+            node.name,
+            path=node.path,
+            namespace=namespace,
+            place=place,
+            description=node.description,
+            **marks.at(node.path),
+        )
 
 
-def _channels(topology: Topology, places: Places) -> Iterator[Box]:
-    for channel in topology.channels.values():
+def _channels(topology: Topology, marks: Marks) -> Iterator[Box]:
+    for index, channel in enumerate(topology.channels.values()):
         ends = channel.ends
         sides: set[Side] = {
             'users' if end.kind.provides else 'providers'
@@ -263,15 +258,16 @@ def _channels(topology: Topology, places: Places) -> Iterator[Box]:
             if getattr(end.entity, 'external', False)
         }
         yield Box(
-            f'{channel.kind}:{channel.name}',
+            f'c{index}',
             channel.kind,
+            f'{channel.kind}:{channel.name}',
             channel.name,
-            commonpath(f'/{end.node.namespace.strip("/")}' for end in ends),
-            _common_place([place_of(end) for end in ends]),
-            ends[0].path,
-            places.get((channel.kind, channel.name), ()),
-            types=tuple(dict.fromkeys(end.entity.type for end in ends)),
+            details=tuple(dict.fromkeys(end.entity.type for end in ends)),
+            path=ends[0].path,
+            namespace=commonpath(f'/{end.node.namespace.strip("/")}' for end in ends),
+            place=_common_place([place_of(end) for end in ends]),
             external=tuple(sorted(sides)),
+            **marks.at((channel.kind, channel.name)),
         )
 
 
@@ -282,31 +278,51 @@ def _common_place(places: Sequence[Place]) -> Place:
     return hosts.pop(), workers.pop() if len(workers) == 1 else ''
 
 
-def _edges(context: CheckContext, places: Places, ids: Mapping[DataPath, str]) -> Iterator[Edge]:
+def _edges(
+    context: CheckContext, marks: Marks, boxes: Mapping[str, Box], at: Mapping[DataPath, Box]
+) -> Iterator[Edge]:
+    tokens = (f'e{index}' for index in count())
     for channel in context.topology.channels.values():
         deliveries = deliveries_of(channel, context.spec.qos)
         for end in channel.ends:
             # A process may have several nodes; components are drawn apart.
-            boxed = end.node.path if end.node.path in ids else end.node.path[:2]
-            node = ids[boxed]
-            inner = '' if boxed == end.node.path else str(end.node.path[-1])
-            owner = '/'.join(filter(None, (node.partition(':')[2], inner)))
+            node = at.get(end.node.path) or at[end.node.path[:2]]
+            inner = '' if node.path == end.node.path else str(end.node.path[-1])
+            owner = '/'.join(filter(None, (node.id.partition(':')[2], inner)))
+            ways = (node, boxes[f'{channel.kind}:{channel.name}'])
+            if not sends(channel.kind, provides=end.kind.provides):
+                ways = ways[::-1]
             noun = end.kind.noun
-            followed = getattr(end.entity, 'by_parameter', {})
-            ways = (node, f'{channel.kind}:{channel.name}')
+            qos = _differing_policies(end, context.spec.qos)
+            policies = ', '.join(_describe_policy(key, value) for key, value in qos.items())
+            parameters = getattr(end.entity, 'by_parameter', {})
+            followed = {key: value.parameter for key, value in parameters.items()}
+            follows = ', '.join(f'{key} by parameter {name}' for key, name in followed.items())
+            delivery = deliveries[end.path]
+            # External ends are drawn.
+            way = '' if delivery.reason == OUTSIDE else str(delivery)
             yield Edge(
+                next(tokens),
+                channel.kind,
                 f'{noun}:{owner}:{end.entity.name}',
-                f'{noun} server' if noun == channel.kind else noun,
                 end.entity.name,
-                *ways,
-                ways if sends(channel.kind, provides=end.kind.provides) else ways[::-1],
-                end.entity.type,
-                _differing_policies(end, context.spec.qos),
-                deliveries[end.path],
+                tuple(filter(None, (policies, way, follows))),
                 end.path,
-                places.get(end.path, ()),
-                {key: value.parameter for key, value in followed.items()},
+                **marks.at(end.path),
+                start=ways[0],
+                end=ways[1],
+                role=f'{noun} server' if noun == channel.kind else noun,
+                type=end.entity.type,
+                qos=qos,
+                delivery=delivery,
+                by_parameter=followed,
             )
+
+
+def _describe_policy(key: str, value: Any) -> str:
+    if key in _SELF_EXPLANATORY and value not in ('system_default', 'best_available'):
+        return str(value)
+    return f'{key.replace("_", " ")} {format_policy_value(key, value)}'
 
 
 def _differing_policies(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[str, Any]:
@@ -324,7 +340,10 @@ def sends(channel: str, *, provides: bool) -> bool:
     return provides == (channel == 'topic')
 
 
-def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) -> Iterator[Wait]:
+def _waits(
+    context: CheckContext, boxes: Mapping[str, Box], at: Mapping[DataPath, Box]
+) -> Iterator[Edge]:
+    waits: list[tuple[Box | None, Box, DataPath]] = []
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
             kind, name = condition.kind, condition.name
@@ -332,12 +351,16 @@ def _waits(context: CheckContext, known: set[str], ids: Mapping[DataPath, str]) 
                 name = expand_name(name, waiter.name, waiter.namespace or '/')
             elif kind != 'process':
                 name = full_name(waiter, kind, name)
-            if f'{kind}:{name}' in known:
-                yield Wait(ids[waiter.path], f'{kind}:{name}', condition.path)
+            waits.append((boxes.get(f'{kind}:{name}'), at[waiter.path], condition.path))
     for component in context.spec.components:
         # It is drawn at its container.
-        yield Wait(ids[component.path], f'process:{component.container}', component.path)
+        container = boxes[f'process:{component.container}']
+        waits.append((container, at[component.path], component.path))
     for process in context.spec.processes.values():
         for action in process.on_exit:
-            if f'process:{action.start}' in known:
-                yield Wait(f'process:{action.start}', ids[process.path], action.path)
+            started = boxes.get(f'process:{action.start}')
+            if started:
+                waits.append((at[process.path], started, action.path))
+    known = [(start, end, path) for start, end, path in waits if start]
+    for index, (start, end, path) in enumerate(known):
+        yield Edge(f'w{index}', 'wait', details=('before',), path=path, start=start, end=end)

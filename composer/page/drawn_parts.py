@@ -16,8 +16,8 @@ from composer.checks.checker import check_in_context, create_context
 from composer.diagnostics import describe_finding, relative_path
 from composer.drawing.excerpts import Excerpt, Excerpts
 from composer.drawing.graphviz import render_svg
-from composer.drawing.picture import Box, Edge, build_picture
-from composer.drawing.shapes import arrange_shapes, count_kinds
+from composer.drawing.picture import Edge, build_picture
+from composer.drawing.shapes import arrange, count_kinds
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.bindings import node_bindings
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.drawing.picture import Picture, Side
+    from composer.drawing.picture import Part, Picture, Side
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
 
@@ -102,7 +102,7 @@ class Drawing:
         self.name = picture.name
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
-        self.topic_of_ends = {edge.id: edge.channel for edge in picture.edges}
+        self.topic_of_ends = {edge.id: edge.channel.id for edge in picture.edges}
         self._lock = threading.Lock()
         self._fold = lru_cache(_MOST_FOLDED)(self._describe)
         self.fold(())
@@ -136,7 +136,7 @@ class Drawing:
         with ThreadPoolExecutor() as pool:
             # Graphviz has another process for each, and takes as long as the rest.
             layouts = pool.map(partial(render_svg, self._picture, folded), self._directions)
-            drawn = arrange_shapes(self._picture, folded)
+            drawn = arrange(self._picture, folded)
             parts = dict(_parts(self._picture, self._code))
             parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
             parts |= dict(_bundles(drawn, parts))
@@ -170,22 +170,26 @@ def _parts(
     picture: Picture, code: Mapping[str, list[Excerpt]]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the data of each node, channel and edge, by its token."""
-    tokens, excerpts = picture.tokens(), Excerpts(picture.positions)
-    edges: dict[str, list[Edge]] = defaultdict(list)
+    excerpts = Excerpts(picture.positions)
+    edges: dict[str, list[Part]] = defaultdict(list)
     for edge in picture.edges:
-        for id_ in edge.ends:
-            edges[id_].append(edge)
+        for box in (edge.start, edge.end):
+            edges[box.token].append(edge)
+    near: Sequence[Part]
+    declared: Sequence[Part]
     for part in picture.parts:
-        # Of a channel, the lines of its ends.
-        is_channel = isinstance(part, Box) and part.types
-        declared = edges[part.id][:_MOST_ENDS] if is_channel else [part]
+        kind, near, declared = part.kind, edges[part.token], [part]
+        if isinstance(part, Edge):
+            kind, near = part.role, [part.start, part.end]
+        elif part.details:
+            # Of a channel, the lines of its ends.
+            declared = near[:_MOST_ENDS]
         lines = dict.fromkeys(lines for each in declared for lines in excerpts.of(each.path))
-        near = part.ends if isinstance(part, Edge) else [edge.id for edge in edges[part.id]]
-        name = part.title.removeprefix(f'{part.kind} ')
+        name = part.title.removeprefix(f'{kind} ')
         yield (
-            tokens[part.id],
+            part.token,
             {
-                **_part(part.id, part.kind, name, part.facts, [tokens[id_] for id_ in near]),
+                **_part(part.id, kind, name, part.facts, [each.token for each in near]),
                 'findings': part.findings,
                 'excerpts': [each._asdict() for each in (*lines, *code.get(part.id, ()))],
             },
@@ -194,7 +198,7 @@ def _parts(
 
 def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the data of a region; `near` are the ends in it of what crosses its border."""
-    members = {shape.token: shape.kind for shape in region.all_shapes()}
+    members = {box.token: box.kind for box in region.all_boxes()}
     ends = dict.fromkeys(end for each in members if each in parts for end in parts[each]['near'])
     near = [end for end in ends if len(members.keys() & set(parts[end]['near'])) == 1]
     name = region.title.removeprefix(f'{region.kind} ')
@@ -211,7 +215,7 @@ def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str
     for line in drawn.lines:
         near = [part for part, by in drawn.stands_in.items() if by == line.token and part in parts]
         if near:
-            start, end = (parts[token] for token in (line.start, line.end))
+            start, end = (parts[box.token] for box in (line.start, line.end))
             id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'
             yield line.token, _part(id_, 'connections', name, line.details, near)
 

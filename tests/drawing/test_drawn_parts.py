@@ -89,7 +89,7 @@ def test_a_topic_has_the_lines_of_its_ends(data):
 
 def test_an_end_tells_its_qos(data):
     assert data['parts']['e0']['name'] == 'words of node /talker'
-    assert data['parts']['e0']['facts'] == ['std_msgs/msg/String', 'QoS: depth 5, best_effort']
+    assert data['parts']['e0']['facts'] == ['std_msgs/msg/String', 'depth 5, best_effort']
 
 
 def test_a_topic_tells_its_external_ends(data):

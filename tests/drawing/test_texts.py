@@ -150,7 +150,7 @@ def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
     text = html.unescape(render_picture(draw(SYSTEM), 'svg'))
     assert (
         '<title>publisher scan of node /robot/front/lidar\nstd_msgs/msg/String\n'
-        'QoS: depth 5, best_effort\non topic' in text
+        'depth 5, best_effort\non topic' in text
     )
     assert '<title>topic /robot/map\nstd_msgs/msg/String\nexternal subscriptions</title>' in text
 
