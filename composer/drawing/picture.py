@@ -343,7 +343,7 @@ def sends(channel: str, *, provides: bool) -> bool:
 def _waits(
     context: CheckContext, boxes: Mapping[str, Box], at: Mapping[DataPath, Box]
 ) -> Iterator[Edge]:
-    waits: list[tuple[Box | None, Box, DataPath]] = []
+    waits: list[tuple[Box | None, Box | None, DataPath]] = []
     for waiter in waiters(context.spec):
         for condition in waiter.wait_for:
             kind, name = condition.kind, condition.name
@@ -356,11 +356,11 @@ def _waits(
         # It is drawn at its container.
         container = boxes[f'process:{component.container}']
         waits.append((container, at[component.path], component.path))
-    for process in context.spec.processes.values():
-        for action in process.on_exit:
-            started = boxes.get(f'process:{action.start}')
-            if started:
-                waits.append((at[process.path], started, action.path))
-    known = [(start, end, path) for start, end, path in waits if start]
+    waits += [
+        (at[process.path], boxes.get(f'process:{action.start}'), action.path)
+        for process in context.spec.processes.values()
+        for action in process.on_exit
+    ]
+    known = [(start, end, path) for start, end, path in waits if start and end]
     for index, (start, end, path) in enumerate(known):
         yield Edge(f'w{index}', 'wait', details=('before',), path=path, start=start, end=end)

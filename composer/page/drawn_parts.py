@@ -8,15 +8,15 @@ from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from composer.application.file_selection import load_given
 from composer.checks.absent_packages import AbsentPackages
 from composer.checks.checker import check_in_context, create_context
+from composer.confidential import may_show_lines
 from composer.diagnostics import describe_finding, relative_path
-from composer.drawing.excerpts import Excerpt, Excerpts
 from composer.drawing.graphviz import render_svg
-from composer.drawing.picture import Edge, build_picture
+from composer.drawing.picture import Box, Edge, build_picture
 from composer.drawing.shapes import arrange, count_kinds
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
@@ -28,9 +28,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
+    from composer.diagnostics import SourceFile, Span
     from composer.drawing.picture import Part, Picture, Side
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
+    from composer.yaml_text.positions import DataPath, SourceMap
 
 _OPENING = re.compile(r'.*?<svg[^>]*?viewBox="([^"]*)"[^>]*>', re.DOTALL)
 # A drawing of more nodes is not tried both ways: it takes seconds.
@@ -38,9 +40,26 @@ _MOST_NODES_TRIED = 150
 # Of a topic with many ends, the lines of the first ones.
 _MOST_ENDS = 6
 _MOST_CODE_LINES = 15
+# The depth of `nodes: {<name>: …}`; every part lies below such an entry.
+_NODE = 2
 # What is left for the drawing in a window of 1440 by 900.
 _STAGE = 680, 850
 _MOST_FOLDED = 16
+
+
+class Excerpt(NamedTuple):
+    """Successive lines of a file.
+
+    Attributes:
+        file: The path as reports show it, or the `--set` option without its value.
+        first: The number of the first line, counted from 1.
+        what: What the lines are of, as a timer's function; empty for a part itself.
+    """
+
+    file: str
+    first: int
+    lines: tuple[str, ...]
+    what: str = ''
 
 
 def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence[str]) -> Drawing:
@@ -175,15 +194,12 @@ def _parts(
     for edge in picture.edges:
         for box in (edge.start, edge.end):
             edges[box.token].append(edge)
-    near: Sequence[Part]
-    declared: Sequence[Part]
     for part in picture.parts:
-        kind, near, declared = part.kind, edges[part.token], [part]
+        kind, near = part.kind, edges[part.token]
         if isinstance(part, Edge):
             kind, near = part.role, [part.start, part.end]
-        elif part.details:
-            # Of a channel, the lines of its ends.
-            declared = near[:_MOST_ENDS]
+        # Of a channel, the lines of its ends.
+        declared = near[:_MOST_ENDS] if isinstance(part, Box) and part.details else [part]
         lines = dict.fromkeys(lines for each in declared for lines in excerpts.of(each.path))
         name = part.title.removeprefix(f'{kind} ')
         yield (
@@ -225,3 +241,54 @@ def _part(
 ) -> dict[str, Any]:
     about = {'id': id_, 'kind': kind, 'name': name, 'facts': facts, 'near': near}
     return {**about, 'findings': (), 'excerpts': ()}
+
+
+class Excerpts:
+    """Finds the lines of entries; environment variables of processes are left out."""
+
+    def __init__(self, positions: SourceMap) -> None:
+        self._positions = positions
+        self._spans: dict[DataPath, list[tuple[DataPath, Span]]] = defaultdict(list)
+        # The column from which a line is left out.
+        self._ends: dict[tuple[SourceFile, int], int] = {}
+        for path, span in (*positions.keys.items(), *positions.values.items()):
+            self._spans[path[:_NODE]].append((path, span))
+            if path[:1] == ('processes',) and path[_NODE : _NODE + 1] == ('env',):
+                for number in range(span.line, _last_line(span) + 1):
+                    column = span.column if number == span.line else 1
+                    before = self._ends.get((span.source, number), column)
+                    self._ends[span.source, number] = min(column, before)
+
+    def of(self, path: DataPath) -> list[Excerpt]:
+        """Return the lines of an entry: those below its key, then those of other files."""
+        key = self._positions.key(path)
+        numbers = defaultdict(list, {key.source: [key.line, _last_line(key)]})
+        for at, span in self._spans[path[:_NODE]]:
+            if at[: len(path)] == path and span.source is not key.source:
+                numbers[span.source].append(span.line)
+        return [
+            self._excerpt(source, min(lines), max(lines))
+            for source, lines in numbers.items()
+            if may_show_lines(source.name)
+        ]
+
+    def _excerpt(self, source: SourceFile, first: int, last: int) -> Excerpt:
+        is_file = source.home is None
+        name = relative_path(source.name) if is_file else source.name.partition('=')[0]
+        lines = []
+        for number in range(first, last + 1):
+            end = self._ends.get((source, number))
+            line = source.line(number)
+            lines.append(line if end is None else f'{line[: end - 1]}…')
+        return Excerpt(name, first, tuple(lines))
+
+
+def _last_line(key: Span) -> int:
+    """Return the last line of an entry: all lines that are indented below its key."""
+    last = key.line
+    for number, line in enumerate(key.source.lines[key.line :], key.line + 1):
+        if line.strip():
+            if len(line) - len(line.lstrip(' ')) < key.column:
+                break
+            last = number
+    return last

@@ -20,8 +20,7 @@ from composer.application.watched_files import WatchedFiles
 from composer.diagnostics import describe_finding
 from composer.errors import ComposerError
 from composer.page.drawn_parts import draw_files
-from composer.page.outside import find_outside
-from composer.page.problems import list_problems
+from composer.page.problems import find_outside, list_problems
 from composer.planning.text import render_plan
 from composer.runtime.control import protocol
 
