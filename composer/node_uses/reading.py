@@ -397,12 +397,9 @@ class Run:
     ) -> None:
         """Note a problem, unless the behaviour is ready for it.
 
-        Where only the file decides whether the place is reached, it has to look like a typo: then
-        the help begins with what may have been meant.
+        It is one in any system, so where only the file decides whether the place is reached, too.
         """
-        is_typo = (help_text or '').startswith('did you mean')
-        is_doubtful = bool(self.doubts) and not is_typo
-        if not (self.guards or self.broad_guards or is_doubtful):
+        if not (self.guards or self.broad_guards):
             problem = Problem(rule, message, module.span_of(node), help_text)
             self.reading.problems.append(problem)
 

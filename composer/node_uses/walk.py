@@ -39,6 +39,7 @@ from composer.python_source.syntax import (
     list_arguments,
     list_children,
     list_nodes,
+    owner_of,
     stored_names,
     words_in,
 )
@@ -575,6 +576,7 @@ class Walk:
                 value = Chain((*owner.path, name)) if isinstance(owner, Chain) else None
         if isinstance(value, Chain):
             self._use(value, node, scope)
+            self._visit_calls(node, scope)
             return
         if isinstance(node, ast.Subscript):
             self._subscript(node, scope)
@@ -584,6 +586,12 @@ class Walk:
             self._check_defined(node, scope)
             if isinstance(value, Function):
                 self._hand_on(value, [])
+
+    def _visit_calls(self, node: ast.expr, scope: Scope) -> None:
+        """Visit the call whose result a chain begins with, as in `node.send_goal('a').status`."""
+        owner = owner_of(node)
+        if isinstance(owner, ast.Call | ast.Await):
+            self.visit(owner, scope)
 
     def _check_defined(self, node: ast.Name, scope: Scope) -> None:
         top = scope.module.top
@@ -748,7 +756,9 @@ class Walk:
         path = chain.path[2 if of_type else 1 :]
         is_guarded = run.guards or run.broad_guards or run.fixed
         if path and (is_write or not is_guarded):
-            value, certain = self._stored.get(id(node)), not run.doubts
+            value = self._stored.get(id(node))
+            # The type of a message that the behaviour makes is the same in any system.
+            certain = bool(of_type) or not run.doubts
             use = MessageUse(path, node, scope.module, is_write, certain, of_type, value)
             run.reading.message_uses.append(use)
         for inner in ast.walk(node):
@@ -814,10 +824,8 @@ class Walk:
             case External(name=name) if (interface := find_interface(name)) is not None:
                 for each in call.keywords:
                     if each.arg and not (self.run.guards or self.run.broad_guards):
-                        path, value, certain = (each.arg,), each.value, not self.run.doubts
-                        use = MessageUse(
-                            path, value, scope.module, True, certain, interface, value
-                        )
+                        path, value = (each.arg,), each.value
+                        use = MessageUse(path, value, scope.module, True, True, interface, value)
                         self.run.reading.message_uses.append(use)
             case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):
                 if self._call_attribute(func.name, call, scope):
@@ -895,6 +903,7 @@ class Walk:
             case ('goal', name, 'result' | 'result_async' as method):
                 if scope.waits and not run.doubts and (method == 'result' or is_awaited):
                     run.use('action client', Texts(((name, call, scope.module),)), waits='end')
+                self._visit_calls(call.func, scope)
             case ('message', *path, method):
                 if method in _MUTATORS and path and isinstance(call.func, ast.Attribute):
                     use = MessageUse(tuple(path), call.func.value, scope.module, is_write=True)
@@ -905,6 +914,7 @@ class Walk:
                 is_noted = False
         if not is_noted:
             self._note_read(chain, call.func, scope)
+            self._visit_calls(call.func, scope)
         self._pass_on(call, None, scope)
 
     def _call_node(self, method: str, call: ast.Call, scope: Scope, *, is_awaited: bool) -> None:

@@ -132,6 +132,13 @@ def is_none(expression: ast.expr | None) -> bool:
     )
 
 
+def owner_of(node: ast.expr) -> ast.expr:
+    """Return what `a` is in `a.b` and `a[0].c`."""
+    while isinstance(node, ast.Attribute | ast.Subscript):
+        node = node.value
+    return node
+
+
 def words_in(*nodes: ast.AST | None) -> set[str]:
     """Return the names and attributes in expressions."""
     inner = [each for node in nodes if node is not None for each in ast.walk(node)]

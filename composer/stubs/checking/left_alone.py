@@ -97,7 +97,7 @@ class ReportedPlace:
 
     @property
     def is_left_alone(self) -> bool:
-        """Whether what the report is about may be caught, asked for, or never come."""
+        """Whether what the report is about may be caught or asked for, or is never reached."""
         chain, function = self.around, self.function
         if not chain or any(itertools.starmap(_is_guarded, itertools.pairwise(chain))):
             return True
@@ -105,13 +105,18 @@ class ReportedPlace:
         inner = next((i for i, node in enumerate(chain) if isinstance(node, ast.stmt)), 0)
         part = chain[max(0, inner - 1)] if hasattr(chain[inner], 'body') else chain[inner]
         names = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)}
-        return bool(names & asked) or any(map(_is_of_file, _tests_before(chain)))
+        return bool(names & asked)
+
+    @property
+    def is_chosen_by_file(self) -> bool:
+        """Whether only the file decides whether what the report is about is reached."""
+        return any(map(_is_of_file, _tests_before(self.around)))
 
     @property
     def depends_on_file(self) -> bool:
         """Whether the report comes after a branch that ends its function as the file says.
 
-        Of a branch with the report in it, `is_left_alone` knows.
+        Of a branch with the report in it, `is_chosen_by_file` knows.
         """
         function, around = self.function, {id(node) for node in self.around}
         if function is None:

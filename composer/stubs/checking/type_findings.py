@@ -23,7 +23,7 @@ from composer.node_uses.message_uses import explain_unknown
 from composer.node_uses.names import assignments, find_stored
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
-from composer.python_source.syntax import positional_names, words_in
+from composer.python_source.syntax import owner_of, positional_names, words_in
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
@@ -126,8 +126,29 @@ class TypeFindings:
             place = ReportedPlace(copy, report)
             reader = self._readers.get(report.kind)
             problem = reader(place) if reader and not place.is_left_alone else None
+            if problem and place.is_chosen_by_file and not self._is_in_any_system(place, problem):
+                continue
             if problem:
                 yield self._finding(copy, self._use(place), problem), place.lines
+
+    def _is_in_any_system(self, place: ReportedPlace, problem: _Problem) -> bool:
+        """Return whether it is of a message that the function makes, or of a call's arguments."""
+        node, rule, *_ = problem
+        if place.report.kind in ('bad-argument-count', 'unexpected-keyword'):
+            return True
+        if rule not in ('field-type', 'unknown-field') or 'parameters' in words_in(node):
+            return False
+        used: list[ast.expr] = [node, *place.calls]
+        for each in place.around:
+            used += each.targets if isinstance(each, ast.Assign) else []
+        for owner in map(owner_of, used):
+            stored = isinstance(owner, ast.Name) and _sources(place, owner.id)
+            sources = stored or [(owner, False)]
+            match sources[0][0]:
+                case ast.Call(func=ast.Name()) as made if len(sources) == 1:
+                    if _is_made(place.copy.module.source.imports, made):
+                        return True
+        return False
 
     @cached_property
     def _readers(self) -> Mapping[str, Callable[[ReportedPlace], _Problem | None]]:
@@ -253,8 +274,7 @@ class TypeFindings:
         """Return whether a value is no union, of which reports name the part that does not fit."""
         if self._is_declared(place, value):
             return True
-        while isinstance(value, ast.Attribute | ast.Subscript):
-            value = value.value
+        value = owner_of(value)
         value = value.value if isinstance(value, ast.Await) else value
         imports = place.copy.module.source.imports
         if not isinstance(value, ast.Name):
@@ -485,6 +505,7 @@ class TypeFindings:
         advice = 'write .to_msg()' if given in _TIMES else advice
         path = f'{in_python(description.name)}: {name}'
         expected = in_python(field.type.nested) if field.type.nested else str(field.type)
+        expected += '[]' if field.type.nested and field.type.array else ''
         message = f'{path}: expected {expected}, got {self._shown(given)}'
         return value, 'field-type', message, advice
 
@@ -492,7 +513,7 @@ class TypeFindings:
         if given in _TIMES:
             return is_stored and not field_type.array
         if not self._is_message(given) or field_type.array:
-            return False
+            return is_stored and self._is_message(given)
         nested = self.context.types.describe(field_type.nested) if field_type.nested else None
         is_other = nested and len(nested.fields) > 1 and nested.name != self.messages[given]
         return bool(is_other) or not field_type.nested

@@ -172,6 +172,10 @@ WRONG = {
     'print(mesage)': 'undefined-name',
     "try: node.publish('command', {'lat': 1.0})\nexcept Exception: print()": 'unknown-field',
     'while True: pass_on(node, "level", 1)': 'endless-loop',
+    # wrong in any system, whatever the file says
+    "if node.parameters.mode == 'fast': await node.call('enable', True)": 'missing-await',
+    'if node.parameters.speed > 2: t = Twist(); t.speed = 1.0': 'unknown-field',
+    "if node.parameters.speed > 2: node.publish('command', Twist(speed=1.0))": 'unknown-field',
 }
 RIGHT = [
     "from composer import PayloadError\ntry: node.publish('command', {'lat': 1.0})\nexcept PayloadError: print()",

@@ -46,6 +46,20 @@ def test_a_publisher_that_is_taken_is_used(check, line):
     assert 'unused-publisher' not in [rule for _, rule in found]
 
 
+@pytest.mark.parametrize('line', ['.cancel()', '.feedback', '.result().sequence', '.status'])
+@pytest.mark.parametrize('condition', ['', 'if node.parameters.speed > 2: '])
+def test_what_a_goal_takes_is_used_wherever_its_handle_goes(check, condition, line):
+    ends = 'action_clients: {count: {type: test_msgs/action/Fibonacci, external: true}}'
+    goal = "node.send_goal('count', {'order': int(node.parameters.speed)})"
+    assert (
+        check(
+            NODE + f'    {ends}\n',
+            run("node.publish('out', '')", f'{condition}print({goal}{line})'),
+        )
+        == []
+    )
+
+
 @pytest.mark.parametrize(
     'line',
     [

@@ -33,8 +33,15 @@ def obey(node, message):
     return f'{speed}'
 
 
-def look(_node, scan, longest=LaserScan.LONGEST):  # error
+def look(node, scan, longest=LaserScan.LONGEST):  # error
     scan.ranges = [1.0, longest]
+    if node.parameters.speed > 2:
+        copied = LaserScan(angle_min=node.now())  # error
+        copied.header.stamp = node.now()  # error
+        copied.header.stamp.seconds = 1  # error
+        copied.range_min = node.parameters.mode
+        node.logger.info('far', every=2)  # error
+        scan.distance = 1.0
     scan.range_maximum = max(scan.ranges)  # error
 
 
