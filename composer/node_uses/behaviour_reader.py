@@ -132,6 +132,9 @@ class BehaviourReader:
             second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
             values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]
             given: dict[str, Value] = dict(zip(function.parameters, values, strict=False))
+            if len(given) < len(values) and function.definition.args.vararg is None:
+                # Which of them it lacks, nobody knows.
+                return unknown_reading()
             walk.enter(function, {**given}, is_waited=True, is_call=False)
             _Results(walk, function, given, binding, wire).note()
             if len(given) < len(binding.parameters):

@@ -46,6 +46,14 @@ def test_a_publisher_that_is_taken_is_used(check, line):
     assert 'unused-publisher' not in [rule for _, rule in found]
 
 
+def test_of_a_function_that_lacks_the_node_only_its_signature_is_a_finding(check):
+    ends = 'subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:hear}}'
+    found = check(
+        f'{NODE}    {ends}\n', f'{run(USES_ALL)}def hear(message):\n    print(message.data)\n'
+    )
+    assert [rule for _, rule in found] == ['bad-signature']
+
+
 @pytest.mark.parametrize('line', ['.cancel()', '.feedback', '.result().sequence', '.status'])
 @pytest.mark.parametrize('condition', ['', 'if node.parameters.speed > 2: '])
 def test_what_a_goal_takes_is_used_wherever_its_handle_goes(check, condition, line):
