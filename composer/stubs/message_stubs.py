@@ -163,7 +163,7 @@ class FieldTypes:
 _ARRAY_INTEGERS = frozenset(INTEGER_RANGES) - {'byte'}
 
 
-KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
+_KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 # The parts of services and actions that behaviours name; of the other ones, nothing is said.
 _PARTS = {'srv': ('Request', 'Response'), 'action': ('Goal', 'Result', 'Feedback')}
 _OTHERS = {'srv': 'Event', 'action': 'Impl'}
@@ -183,7 +183,7 @@ def write_packages(
         if package in done:
             continue
         done.add(package)
-        names = [name for kind in KINDS for name in catalogue.names(kind, package)]
+        names = [name for kind in _KINDS for name in catalogue.names(kind, package)]
         interfaces = {name: catalogue.describe(name) for name in names}
         if interfaces:
             fields = [field for part in _parts(interfaces) for field in part.fields]
@@ -197,7 +197,7 @@ def _write_package(
     package: str, interfaces: Mapping[str, InterfaceDescription | None]
 ) -> Iterator[tuple[str, list[str]]]:
     yield f'{package}/__init__.pyi', []
-    for kind in KINDS:
+    for kind in _KINDS:
         imports = StubImports(f'{package}.{kind}')
         lines = [
             line

@@ -4,11 +4,9 @@ from textwrap import dedent
 
 import pytest
 
-from composer.checks.checker import check_in_context, create_context
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
-from composer.stubs.checking.kept_types import TypesCheck
-from composer.stubs.checking.type_checker import find_program
 
 
 @pytest.fixture
@@ -19,15 +17,13 @@ def check(tmp_path, monkeypatch):
     """
     monkeypatch.chdir(tmp_path)
 
-    def run(nodes, code='', *, before='', rule=None, installed=True, tells='message', types=False):
+    def run(nodes, code='', *, before='', rule=None, installed=True, tells='message'):
         (tmp_path / 'parts.py').write_text(dedent(code))
         path = tmp_path / 'system.yaml'
         listed = nodes.lstrip('\n')
         path.write_text(f'version: 1\n{before}nodes:\n{listed}')
         catalogue = InterfaceCatalogue() if installed else InterfaceCatalogue(prefixes=[])
-        system = load_system(path)
-        extra = {'types': TypesCheck(find_program())} if types else {}
-        findings = check_in_context(system, create_context(system, catalogue), extra)
+        findings = check_system(load_system(path), catalogue)
         if rule is None:
             # Systems of a table have state for all its rows.
             kept = [finding for finding in findings if finding.rule != 'unused-state']

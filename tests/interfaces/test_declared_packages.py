@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from composer.checks.checker import check_in_context, create_context
+from composer.checks.checker import check_system
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.interfaces.declared_packages import (
     DeclaredPackages,
@@ -11,8 +11,6 @@ from composer.interfaces.declared_packages import (
     provide_declared,
 )
 from composer.language.pipeline import load_system
-from composer.stubs.checking.kept_types import TypesCheck
-from composer.stubs.checking.type_checker import find_program
 
 pytestmark = pytest.mark.ros
 
@@ -135,9 +133,7 @@ def test_code_and_files_that_use_what_is_left_out_are_findings(folders: Path) ->
         '      grip: hands/msg/Grip\n      glove: hands/msg/Glove\n'
         '    timers: {t: {rate: 1, behaviour: gloves:pick, publish: grip}}\n'
     )
-    system = load_system(path)
-    context = create_context(system, InterfaceCatalogue())
-    findings = check_in_context(system, context, {'types': TypesCheck(find_program())})
+    findings = check_system(load_system(path), InterfaceCatalogue())
     help_text = "add 'msg/Glove' to 'only:' of 'hands' under 'interfaces:'"
     assert [(error.rule, error.message) for error in findings if error.help == help_text] == [
         ('missing-module', "'only:' of the package 'hands' leaves out 'Glove'"),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 from composer.ament import INTERFACE_INDEX, ament_prefixes, find_package
 from composer.interfaces.build.build_cache import find_cache
 from composer.stubs.checking.type_checker import TESTED_VERSION, TypeCheckerError
-from composer.stubs.message_stubs import KINDS
 from composer.stubs.project_modules import all_nodes, find_project_modules
 
 if TYPE_CHECKING:
@@ -134,7 +133,7 @@ def _interface_folders(
         prefix = find_package(package, prefixes, INTERFACE_INDEX)
         if prefix is not None:
             share = prefix / 'share' / package
-            yield from (share / kind for kind in KINDS)
+            yield from (share / kind for kind in ('msg', 'srv', 'action'))
 
 
 def _times(paths: Iterator[Path] | list[Path]) -> list[tuple[str, int]]:

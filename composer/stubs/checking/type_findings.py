@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import builtins
-import importlib.util
 import itertools
 import re
 import sys
@@ -29,7 +28,6 @@ from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.annotated_copies import changed_names
 from composer.stubs.checking.left_alone import ReportedPlace
-from composer.stubs.message_stubs import KINDS
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
@@ -50,11 +48,9 @@ if TYPE_CHECKING:
     from composer.stubs.node_stubs import NodeShape
 
 # Where something is wrong, its rule, and the message with the help.
-_Problem: TypeAlias = 'tuple[ast.AST, str, str, str | None]'
+_Problem: TypeAlias = 'tuple[ast.expr, str, str, str | None]'
 
 _ATTRIBUTE = re.compile(r'(?:Object of class|Class) `(\w+)` has no (?:class )?attribute `(\w+)`')
-_OF_MODULE = re.compile(r'(?:No attribute|Could not import) `(\w+)` (?:in module|from) `([\w.]+)`')
-_NO_MODULE = re.compile(r'Cannot find module `(\w+)\.(msg|srv|action)`')
 _ARGUMENT = re.compile(
     r'Argument `([^`]+)` is not assignable to parameter `(\w+)` with type `([^`]+)` '
     r'in function `([\w.]+)`'
@@ -81,7 +77,7 @@ _PARTS = {
     'Time': 'a time',
     'Duration': 'a duration',
 }
-_INTERFACE = re.compile(r'\.(msg|srv|action)\b')
+_INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
@@ -136,14 +132,13 @@ class TypeFindings:
                 yield self._finding(copy, self._use(place), problem), place.lines
 
     def _is_in_any_system(self, place: ReportedPlace, problem: _Problem) -> bool:
-        """Return whether it is of a module, a message that the function makes, or arguments."""
+        """Return whether it is of a message that the function makes, or of a call's arguments."""
         node, rule, *_ = problem
-        is_of_call = place.report.kind in ('bad-argument-count', 'unexpected-keyword')
-        if is_of_call or rule == 'missing-module' or _OF_MODULE.search(place.report.message):
+        if place.report.kind in ('bad-argument-count', 'unexpected-keyword'):
             return True
         if rule not in ('field-type', 'unknown-field') or 'parameters' in words_in(node):
             return False
-        used = [each for each in (node, *place.calls) if isinstance(each, ast.expr)]
+        used: list[ast.expr] = [node, *place.calls]
         for each in place.around:
             used += each.targets if isinstance(each, ast.Assign) else []
         for owner in map(owner_of, used):
@@ -166,8 +161,6 @@ class TypeFindings:
             'incompatible-comparison': self._comparison,
             'invalid-yield': self._return,
             'missing-attribute': self._attribute,
-            'missing-import': self._missing,
-            'missing-module-attribute': self._missing,
             'no-matching-overload': self._argument,
             'not-callable': self._called,
             'not-iterable': self._iteration,
@@ -198,13 +191,12 @@ class TypeFindings:
 
     def _attribute(self, place: ReportedPlace) -> _Problem | None:  # noqa: C901
         match = _ATTRIBUTE.search(place.report.message)
-        if match is None:
-            return self._missing(place)
-        owner, name = match.groups()
+        owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
         node, meant = next(found, None), _MEANT.search(place.report.message)
-        is_asked = name.startswith('_') or name in place.copy.asked
-        if is_asked or not isinstance(node, ast.Attribute) or isinstance(node.ctx, ast.Del):
+        if name.startswith('_') or name in place.copy.asked:
+            return None
+        if not isinstance(node, ast.Attribute) or isinstance(node.ctx, ast.Del):
             return None
         advice = did_you_mean(meant[1] if meant else None)
         of_node = owner.removesuffix('Parameters').removesuffix('State')
@@ -322,51 +314,6 @@ class TypeFindings:
         (known, _), *others = stored
         is_one = not others and value.id not in seen
         return is_one and self._is_declared(place, known, seen | {value.id})
-
-    # Modules
-
-    def _missing(self, place: ReportedPlace) -> _Problem | None:
-        """Return a name that a module of Python, Composer or messages does not have."""
-        missing = _NO_MODULE.search(place.report.message)
-        match = _OF_MODULE.search(place.report.message)
-        owner, name = missing.groups() if missing else match.groups()[::-1] if match else ('', '_')
-        package, modules = owner.partition('.')[0], self.context.modules
-        is_own = any(each.partition('.')[0] == package for each in self.modules)
-        is_read = place.report.kind == 'missing-attribute'
-        is_given = is_read and name in self.defined | place.copy.asked
-        if is_own or is_given or name.startswith('_') or modules.has(f'{owner}.{name}'):
-            return None
-        if package in self.context.catalogue.packages():
-            message, advice = self._missing_interface(owner, name)
-        elif missing or package not in {*_OF_PYTHON, 'composer', 'rclpy'}:
-            return None
-        else:
-            loaded = sys.modules.get(owner)
-            known = {*dir(loaded), *getattr(loaded, '__all__', ())} if loaded else _TIMES
-            message, advice = f"{owner} has no '{name}'", suggest(name, known)
-            # Another Python may run the system, and of rclpy the stubs do not tell all.
-            is_certain = package != 'rclpy' and importlib.util.find_spec('rclpy')
-            if name in known or not (advice or is_certain):
-                return None
-        node = place.around[0]
-        aliases = (each for each in getattr(node, 'names', ()) if each.name == name)
-        rule = 'missing-module' if isinstance(node, ast.stmt) else 'unknown-attribute'
-        return next(aliases, node), rule, message, advice
-
-    def _missing_interface(self, owner: str, name: str) -> tuple[str, str | None]:
-        """Return what is wrong with a name of `std_msgs`, or of `std_msgs.msg`."""
-        catalogue = self.context.catalogue
-        package, _, kind = owner.partition('.')
-        message, packages = f"{owner} has no '{name}'", [package, *catalogue.packages()]
-        if advice := self.context.interfaces.explain_left_out(f'{package}/{kind}/{name}'):
-            return f"'only:' of the package '{package}' leaves out '{name}'", advice
-        for other, each in itertools.product(packages, KINDS):
-            if catalogue.has(f'{other}/{each}/{name}'):
-                return message, f"did you mean '{other}.{each}.{name}'?"
-        kinds: dict[str, list[str]] = {each: catalogue.names(each, package) for each in KINDS}
-        known = [each.rpartition('/')[2] for each in kinds.get(kind, ())]
-        known = known or [each for each, names in kinds.items() if names]
-        return message, suggest(name, known, None if kind else 'it has')
 
     # Arguments
 
@@ -794,7 +741,7 @@ def _certain(given: str) -> set[str] | None:
     return names if names <= _SCALARS else None
 
 
-def _span(copy: AnnotatedCopy, node: ast.AST, rule: str, message: str) -> Span:
+def _span(copy: AnnotatedCopy, node: ast.expr, rule: str, message: str) -> Span:
     source = copy.module.source.source
     (line, column), (end_line, end) = copy.start(node), copy.end(node)
     if isinstance(node, ast.Attribute) and f"'{node.attr}'" in message:

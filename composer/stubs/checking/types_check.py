@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from composer.stubs.checking.annotated_copies import Annotator, find_received_values
 from composer.stubs.checking.type_checker import run_type_checker
 from composer.stubs.checking.type_findings import TypeFindings
-from composer.stubs.message_stubs import KINDS, SUPPORT
+from composer.stubs.message_stubs import SUPPORT
 from composer.stubs.node_stubs import NodeShape, merge_shapes, write_nodes
 from composer.stubs.project_modules import all_nodes
 from composer.stubs.system_stubs import (
@@ -104,7 +104,7 @@ def _message_classes(files: dict[str, str]) -> dict[str, str]:
     names: dict[str, str] = {}
     for path, text in files.items():
         package, kind, *rest = path.split('/')
-        if rest and kind in KINDS:
+        if rest and kind in ('msg', 'srv', 'action'):
             for name in _CLASS.findall(text):
                 names[name] = '' if name in names else f'{package}/{kind}/{name}'
     return names

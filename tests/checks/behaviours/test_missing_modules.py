@@ -53,7 +53,7 @@ def project(tmp_path, monkeypatch):
 )
 def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
     before = 'interfaces: {declared: declared}\n'
-    assert check(NODES, code + GO, before=before, rule=RULE, types=True) == []
+    assert check(NODES, code + GO, before=before, rule=RULE) == []
 
 
 @pytest.mark.usefixtures('project')
@@ -74,7 +74,7 @@ def test_imports_of_what_there_is_or_may_be_are_let_pass(check, code):
     ],
 )
 def test_what_cannot_be_imported_is_found(check, code, message):
-    assert check(NODES, code + GO, rule=RULE, types=True) == [message]
+    assert check(NODES, code + GO, rule=RULE) == [message]
 
 
 @pytest.mark.ros
@@ -86,7 +86,7 @@ def test_what_cannot_be_imported_is_found(check, code, message):
         ('from std_msgs.msg._string import String', None),
         ('from declared.msg import Own', None),
         ('from std_msgs.msg import Strin', "std_msgs.msg has no 'Strin'"),
-        ('from std_msgs.srv import String', "std_msgs has no 'srv'"),
+        ('from std_msgs.srv import String', "std_msgs.srv has no 'String'"),
         ('from std_msgs.mgs import String', "there is no module 'std_msgs.mgs'"),
         ('from st_msgs.msg import String', "there is no module 'st_msgs'"),
         ('from declared.msg import Onw', "declared.msg has no 'Onw'"),
@@ -94,5 +94,5 @@ def test_what_cannot_be_imported_is_found(check, code, message):
 )
 def test_types_are_imported_from_where_they_are(check, code, message):
     before = 'interfaces: {declared: declared}\n'
-    found = check(NODES, code + GO, before=before, rule=RULE, types=True)
+    found = check(NODES, code + GO, before=before, rule=RULE)
     assert found == ([message] if message else [])
