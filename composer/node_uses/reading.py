@@ -222,6 +222,7 @@ class Reading:
         fills: What it brings about that others may wait for, and whether it does so itself: what
             it starts may do so, too.
         asked: What it asks first, as in `queue.empty()`.
+        compared: The parameters that it compares with texts, each with the text and its place.
         sleeps: How long it sleeps, in seconds, and where.
         passed: What the functions are given that it runs.
     """
@@ -249,6 +250,7 @@ class Reading:
     payloads: list[Payload] = field(default_factory=list)
     message_uses: list[MessageUse] = field(default_factory=list)
     values_needed: list[NeededValue] = field(default_factory=list)
+    compared: list[tuple[str, str, Span]] = field(default_factory=list)
     passed: list[Passed] = field(default_factory=list)
 
     def open_all(self) -> None:

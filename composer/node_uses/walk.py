@@ -244,6 +244,9 @@ class Walk:
                 self.visit(node.subject, scope)
                 chosen = self._chosen_by(node.subject, scope)
                 for case in node.cases:
+                    for pattern in [case.pattern, *getattr(case.pattern, 'patterns', ())]:
+                        if isinstance(pattern, ast.MatchValue):
+                            self._compare_with(node.subject, pattern.value, scope)
                     with self.run.condition(chosen):
                         if case.guard is not None:
                             self.visit(case.guard, scope)
@@ -657,15 +660,21 @@ class Walk:
                 for operand in operands:
                     self.need(operand, scope)
             case ast.Compare(ops=[ast.Eq() | ast.NotEq()], comparators=[ast.Constant()]):
-                left = self._names.value_of(node.left, scope)
-                match left, operands[1]:
-                    case Chain(path=('goal', _, 'status')), ast.Constant(value=value) as other:
-                        if value not in GOAL_STATUSES:
-                            text = f'the status of a goal is never {value!r}'
-                            help_text = suggest(value, GOAL_STATUSES, 'it is one of')
-                            self.run.report('never-equal', scope.module, other, text, help_text)
+                self._compare_with(node.left, operands[1], scope)
         for operand in operands:
             self.visit(operand, scope)
+
+    def _compare_with(self, node: ast.expr, other: ast.expr, scope: Scope) -> None:
+        match self._names.value_of(node, scope), other:
+            case Chain(path=('goal', _, 'status')), ast.Constant(value=value):
+                if value not in GOAL_STATUSES:
+                    text = f'the status of a goal is never {value!r}'
+                    help_text = suggest(value, GOAL_STATUSES, 'it is one of')
+                    self.run.report('never-equal', scope.module, other, text, help_text)
+            case Chain(path=('node', 'parameters', name)), ast.Constant(value=str() as value):
+                if not self.run.guards:
+                    place = scope.module.span_of(other, value)
+                    self.run.reading.compared.append((name, value, place))
 
     # The node and its parts
 
@@ -713,6 +722,8 @@ class Walk:
                     run.use_state(name, scope.module, owner)
                     if owner is not node:
                         self.need(owner, scope)
+            case ('node', 'ros', name, *_) if _is_question(name):
+                pass
             case ('node', 'ros', *_):
                 run.reading.reaches_ros = True
                 run.reading.open_kinds.add('parameter')
@@ -966,6 +977,11 @@ class Walk:
         for node in call.args[2:]:
             self.visit(node, scope)
         return True
+
+
+def _is_question(method: str) -> bool:
+    """Return whether a method of rclpy's node asks for what has nothing to do with its ends."""
+    return method.startswith(('count_', 'get_')) and 'parameter' not in method
 
 
 def _prefix(node: ast.expr, name: str) -> ast.expr:

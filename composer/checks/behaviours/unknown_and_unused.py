@@ -31,6 +31,7 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
     uses = {name: readings_of(context, node) for name, node in context.spec.nodes.items()}
     lost, unused = _lost_by_node(context), context.system.unused
     yield from _check_names(context, uses, lost)
+    yield from _check_choices(context, uses)
     partial = unused.nodes if unused else {}
     whole = [
         (node, [found for _, found in uses[name]])
@@ -87,6 +88,27 @@ def _check_names(
                 before = found.get(key)
                 found[key] = before.with_related(finding.related) if before else finding
     yield from found.values()
+
+
+def _check_choices(
+    context: CheckContext, uses: dict[str, list[tuple[Binding, Reading]]]
+) -> Iterator[Diagnostic]:
+    """Warn of texts with which parameters are compared that no node has among its choices."""
+    possible: set[Span] = set()
+    found: dict[Span, Diagnostic] = {}
+    for key, node in context.spec.nodes.items():
+        for binding, reading in uses[key]:
+            for name, value, place in reading.compared:
+                choices = node.parameters[name].choices if name in node.parameters else None
+                if not choices or value in choices:
+                    possible.add(place)
+                    continue
+                text = f"the parameter '{name}' is never '{value}'"
+                advice = suggest(value, map(str, choices), 'it is one of')
+                related = [bound_at(context, binding)]
+                finding = diagnostic_at(place, 'never-equal', text, help=advice, related=related)
+                found.setdefault(place, finding)
+    yield from (finding for place, finding in found.items() if place not in possible)
 
 
 def _declared_by_behaviour(

@@ -10,7 +10,6 @@ import builtins
 import itertools
 import re
 import sys
-from collections import ChainMap
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
@@ -26,7 +25,6 @@ from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import owner_of, positional_names, words_in
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
-from composer.stubs.checking.annotated_copies import changed_names
 from composer.stubs.checking.left_alone import ReportedPlace
 from composer.stubs.node_stubs import SENDING
 
@@ -42,7 +40,6 @@ if TYPE_CHECKING:
         AnnotatedCopy,
         FunctionKey,
         FunctionUse,
-        Received,
     )
     from composer.stubs.checking.type_checker import TypeReport
     from composer.stubs.node_stubs import NodeShape
@@ -115,13 +112,6 @@ class TypeFindings:
         self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
     ) -> Iterator[tuple[Diagnostic, range]]:
         """Yield the findings in a module, with the lines of the statements that they are in."""
-        for (module, _), use in self.functions.items():
-            # Type checkers take every text for possible where a parameter has choices.
-            nodes = ast.walk(use.definition) if module == copy.module.name else ()
-            for choice in filter(None, (self._unknown_choice(use, node) for node in nodes)):
-                finding = self._finding(copy, use, choice)
-                line = finding.span.line if finding.span else 0
-                yield finding, range(line, line + 1)
         for report in reports:
             place = ReportedPlace(copy, report)
             reader = self._readers.get(report.kind)
@@ -657,40 +647,6 @@ class TypeFindings:
         message = f'values of these types are never equal: {shown}'
         return found[0], 'never-equal', message, None
 
-    def _unknown_choice(self, use: FunctionUse, node: ast.AST) -> _Problem | None:
-        """Return a text with which a parameter is compared, and which is none of its choices."""
-        match node:
-            case ast.Match(subject=ast.Attribute() as subject, cases=cases):
-                patterns = (each.pattern for each in cases)
-                tests = (each.value for each in patterns if isinstance(each, ast.MatchValue))
-                pairs = (ast.Compare(subject, [ast.Eq()], [test]) for test in tests)
-                problems = (self._unknown_choice(use, pair) for pair in pairs)
-                return next(filter(None, problems), None)
-            case ast.Compare(
-                left=ast.Attribute(
-                    value=ast.Attribute(attr='parameters', value=ast.Name(id=owner)), attr=name
-                ),
-                ops=[ast.Eq() | ast.NotEq()],
-                comparators=[ast.Constant(value=str() as value) as constant],
-            ):
-                received = use.received.get(owner)
-                if received is None or received.is_open or owner in changed_names(use.definition):
-                    return None
-                choices = self._choices(received, name)
-                if choices and value not in choices:
-                    message = f"the parameter '{name}' is never '{value}'"
-                    advice = suggest(value, choices, 'it is one of')
-                    return constant, 'never-equal', message, advice
-        return None
-
-    def _choices(self, received: Received, name: str) -> set[object]:
-        """Return what a parameter of nodes may be; nothing if one of them has no choices."""
-        nodes = ChainMap(*map(dict, self.nodes.values()))
-        found = [nodes[key].parameters.get(name) for key in received.nodes if key in nodes]
-        if len(found) < len(received.nodes) or not all(each and each.choices for each in found):
-            return set()
-        return {choice for each in found if each for choice in each.choices or ()}
-
 
 def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
     """Return whether an expression has the one type that the stubs give it."""
@@ -699,6 +655,8 @@ def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
             return _is_made(imports, inner)
         case ast.Call(func=ast.Name(id=name)):
             return bool(_INTERFACE.search(imports.get(name, '')))
+        case ast.Call(func=ast.Attribute(value=ast.Attribute(attr='node' | '_node'))):
+            return True
         case ast.Call(func=ast.Attribute()) | ast.Attribute() | ast.BinOp():
             return not words_in(value) & {'self', 'cls'}
     return False

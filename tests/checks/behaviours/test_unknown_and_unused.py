@@ -46,6 +46,42 @@ def test_a_publisher_that_is_taken_is_used(check, line):
     assert 'unused-publisher' not in [rule for _, rule in found]
 
 
+@pytest.mark.parametrize(
+    ('line', 'rules'),
+    [
+        ('print(node.ros.get_clock(), node.parameters.sped)', ['unknown-parameter']),
+        ("print(node.ros.declare_parameter('sped', 1), node.parameters.sped)", []),
+        ("print(node.parameters.gear == 'high')", ['never-equal']),
+        ("print(self.node.parameters.gear == 'high')", ['never-equal']),
+        ("match node.parameters.gear:\n            case 'low' | 'high': pass", ['never-equal']),
+        ("print(node.parameters.gear == 'fast')", []),
+        ("try: print(node.parameters.gear == 'high')\n        except KeyError: pass", []),
+    ],
+)
+def test_in_a_class_parameters_are_known_by_their_names_and_choices(check, line, rules):
+    gears = 'gear: {default: low, choices: [low, fast]}'
+    text = NODE.replace('speed: 1.0', f'speed: 1.0, {gears}').replace('parts:run', 'parts:Car.run')
+    code = f"""
+class Car:
+    def __init__(self, node):
+        self.node = node
+
+    def run(self, node):
+        print(node.parameters.gear)
+        {USES_ALL}
+        {line}
+"""
+    assert [rule for _, rule in check(text, code)] == rules
+
+
+def test_a_choice_of_another_node_with_the_same_behaviour_is_no_finding(check):
+    text = """
+  a: {parameters: {gear: {default: low, choices: [low]}}, on_start: parts:run}
+  b: {parameters: {gear: {default: high, choices: [high]}}, on_start: parts:run}
+"""
+    assert check(text, run("print(node.parameters.gear == 'high')")) == []
+
+
 def test_of_a_function_that_lacks_the_node_only_its_signature_is_a_finding(check):
     ends = 'subscriptions: {heard: {type: std_msgs/msg/String, external: true, behaviour: parts:hear}}'
     found = check(
