@@ -121,13 +121,17 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
     for module in modules.values():
         imports, top = module.source.imports.items(), module.source.top
         own |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
-        defined |= {*top.stored_attributes} | top.all_stored - {name for name, _ in imports}
+        stored = top.stored_attributes.copy()
         for node in ast.walk(module.tree):
             match node:
+                case ast.AugAssign(target=ast.Attribute(attr=name)):
+                    # It changes what is there already.
+                    stored[name] -= 1
                 case ast.ClassDef(name=name):
                     own.add(name)
                 case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Store()):
                     own.add(owner)
                 case ast.Constant(value=str(name)) if name:
                     defined.add(name)
+        defined |= {*+stored} | top.all_stored - {name for name, _ in imports}
     return frozenset(own), frozenset(defined)

@@ -10,6 +10,7 @@ class Talker:
 
     def talk(self, node):
         self.count += 1
+        self.cuont += 1  # error
         self.get_logger().info('talks')  # error
         node.logger.info('%d', self.count)  # error
         node.logger.info('talks', throttle_duration_sec=1.0)
