@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -57,6 +58,7 @@ OF_RCLPY = {
     'get_name': 'write node.name',
     'get_parameter': 'write node.parameters.NAME',
 }
+_MESSAGE = re.compile(r'\w+/msg/\w+')
 _PARTS = {'publish': '', 'call': '_Request', 'call_async': '_Request', 'send_goal': '_Goal'}
 
 
@@ -133,10 +135,13 @@ def _note_created(
 ) -> Iterator[tuple[Function, list[Value | None]]]:
     noun = CREATING_METHODS[method]
     of_type = arguments.get('msg_type') or arguments.get('srv_type')
+    given: list[Value | None] = [Chain(('node',))]
     channel = arguments.get('topic') or arguments.get('srv_name')
     _check_options(run, noun, arguments, scope)
     if of_type is not None and channel is not None:
         type_name = _type_named(run, of_type, scope)
+        if noun == 'subscription' and type_name and _MESSAGE.fullmatch(type_name):
+            given.append(Chain(('made', type_name)))
         place = scope.module.span_of(of_type)
         text = only_text(run.names.value_of(channel, scope))
         name = only_text(run.names.value_of(arguments.get('name', channel), scope))
@@ -146,7 +151,7 @@ def _note_created(
     behaviour = arguments.get('behaviour')
     function = run.names.value_of(behaviour, scope) if behaviour is not None else None
     if isinstance(function, Function):
-        yield function, [Chain(('node',))]
+        yield function, given
     elif behaviour is not None:
         run.escape(Chain(('node',)))
 

@@ -66,12 +66,15 @@ class FunctionUse:
     def give(self, name: str, value: Value | None, node: NodeSpec, wire: Wire) -> None:
         """Note what a parameter is given by a behaviour of a node."""
         received = self.received.setdefault(name, Received())
-        if value == Chain(('node',)):
-            received.nodes[node.key] = None
-        elif value == Chain(('message',)) and wire.given:
-            received.messages[wire.given] = None
-        else:
-            received.is_open = True
+        match value:
+            case Chain(path=('node',)):
+                received.nodes[node.key] = None
+            case Chain(path=('message',)) if wire.given:
+                received.messages[wire.given] = None
+            case Chain(path=('made', str(made))):
+                received.messages[made] = None
+            case _:
+                received.is_open = True
 
 
 def find_received_values(

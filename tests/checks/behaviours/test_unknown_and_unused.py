@@ -74,6 +74,24 @@ class Car:
     assert [rule for _, rule in check(text, code)] == rules
 
 
+@pytest.mark.parametrize(
+    ('types', 'rules'),
+    [
+        (['std_msgs/msg/String'], ['unknown-field']),
+        (['std_msgs/msg/String', 'geometry_msgs/msg/Point'], ['unknown-field']),
+        (['std_msgs/msg/Strin'], ['unknown-type']),
+        (['std_msgs/String'], ['unknown-type']),
+        (['std_msgs/msg/String/x'], ['unknown-type']),
+    ],
+)
+def test_the_callback_of_a_subscription_that_code_creates_is_given_its_messages(
+    check, types, rules
+):
+    made = [f"node.create_subscription('{each}', 'in{i}', hear)" for i, each in enumerate(types)]
+    code = run(USES_ALL, *made) + run('print(message.x)', head='def hear(node, message):')
+    assert [rule for _, rule in check(NODE, code)] == rules
+
+
 def test_a_choice_of_another_node_with_the_same_behaviour_is_no_finding(check):
     text = """
   a: {parameters: {gear: {default: low, choices: [low]}}, on_start: parts:run}
