@@ -244,6 +244,6 @@ def test_goals_are_rejected_those_in_flight_end_and_a_latched_message_is_kept(
     peer.change_state('robot', DEACTIVATE)
     wait_for(result.done, 'the result')
     assert result.result().status == GoalStatus.STATUS_ABORTED
-    assert child.matching('[robot]: noted')
+    child.wait_for_line('[robot]: noted')
     peer.run(client.destroy)
     assert child.stop() == 0
