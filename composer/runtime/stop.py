@@ -73,8 +73,11 @@ def stop_node(node: LiveNode, timeout_sec: float, gives_up: Callable[[], bool]) 
         if one of its behaviours hangs, nothing has been done to the node.
     """
     node.behaviour_node.stopping.set()
+    node.gate.is_open = False
+    # What runs may wait for an answer of the node itself.
+    _wait_for(node.running.wait_until_idle, timeout_sec / 2, gives_up)
     node.gate.close()
-    if not _wait_for(node.running.wait_until_idle, timeout_sec, gives_up):
+    if not _wait_for(node.running.wait_until_idle, timeout_sec / 2, gives_up):
         node.behaviour_node.stopping.clear()
         node.gate.open()
         return False

@@ -39,6 +39,13 @@ def stubborn(node):
 def fail(node):
     raise RuntimeError('out of order')
 
+def ask(node):
+    time.sleep(0.2)
+    node.call('self')
+
+def answer(node, request):
+    return {'success': True}
+
 def stop(node):
     node.logger.info('stop')
 
@@ -83,6 +90,23 @@ def test_generators_of_timers_are_closed_before_on_stop_and_before_a_restart(com
     # One that does not let itself be closed is an error.
     assert child.matching(' raised RuntimeError: generator ignored')
     assert told_by(child, 'stubborn')[-1] == 'stop'
+
+
+def test_a_restart_waits_for_calls_that_the_node_itself_answers(compose):
+    text = f"""
+        version: 1
+        nodes:
+          own:
+            timers:
+              ask: {{period: 0.1, behaviour: 'parts:ask', group: reentrant}}
+              {FAILING}
+            service_clients: {{self: {{type: std_srvs/srv/Trigger, service: answer}}}}
+            services: {{answer: {{type: std_srvs/srv/Trigger, behaviour: 'parts:answer'}}}}
+    """
+    child = compose(text, CODE)
+    child.wait_for_line("node 'own' was restarted", times=2)
+    assert not child.matching('hangs')
+    assert child.stop() == 0
 
 
 def test_a_call_that_holds_the_interpreter_does_not_keep_a_stopping_process_alive(compose):
