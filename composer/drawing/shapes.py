@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from composer.drawing.picture import Part, Picture
 
+# A topic with one publisher is a line to each subscription, if there are no more.
+_MOST_SUBSCRIPTIONS = 2
+
 
 @record
 class Region:
@@ -25,6 +28,7 @@ class Region:
         kind: `namespace`, `host` or `worker`.
         title: Its name; a namespace in full.
         is_folded: Whether one box is drawn for all of it.
+        topics: Those that are drawn as lines, not as boxes.
     """
 
     token: str = ''
@@ -33,11 +37,13 @@ class Region:
     title: str = '/'
     is_folded: bool = False
     boxes: list[Box] = field(default_factory=list)
+    topics: list[Box] = field(default_factory=list)
     inner: list[Region] = field(default_factory=list)
 
     def all_boxes(self) -> list[Box]:
-        """Return the boxes in it and in all regions below."""
-        return [*self.boxes, *(box for each in self.inner for box in each.all_boxes())]
+        """Return the boxes and topics in it and in all regions below."""
+        inner = (box for each in self.inner for box in each.all_boxes())
+        return [*self.boxes, *self.topics, *inner]
 
     def as_box(self) -> Box:
         """Return what is drawn for all of it when it is folded."""
@@ -53,7 +59,8 @@ class Arrangement:
     Attributes:
         regions: All regions, each before those in it.
         stands_in: The token of what is drawn for each box, line and region that is in a folded
-            region, and for each line that is drawn with others as one.
+            region, for each line that is drawn with others as one, and for the ends of a topic
+            that is drawn as a line.
     """
 
     root: Region
@@ -68,17 +75,15 @@ def arrange(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
     Args:
         folded: The ids of regions that are drawn as one box.
     """
-    root, regions = Region(), dict[str, Region]()
-    lines = [*picture.edges]
-    for box in (*picture.nodes, *picture.channels):
-        region = root
-        for kind, key, title in _list_regions(box):
-            id_ = f'{region.id}/{key}'
-            if id_ not in regions:
-                regions[id_] = Region(f'g{len(regions)}', id_, kind, title, id_ in folded)
-                region.inner.append(regions[id_])
-            region = regions[id_]
-        region.boxes.append(box)
+    topics = dict(_list_topic_lines(picture))
+    of_topics = {end.token: token for token, ends in topics.items() for end in ends}
+    root, regions = _nest(picture, topics, folded)
+    lines: list[Edge] = []
+    for edge in picture.edges:
+        if edge.token not in of_topics:
+            lines.append(edge)
+        elif edge.role == 'publisher':
+            lines += _join(topics[of_topics[edge.token]])
     for channel in picture.channels:
         for side in channel.external:
             outside = Box(f'x{channel.token}{side[0]}', 'external', name='external')
@@ -92,11 +97,31 @@ def arrange(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
         # What is in a folded region is drawn by the outermost one.
         by = stands_in.get(region.token) or (region.as_box() if region.is_folded else None)
         if by:
-            inside: list[Box | Region] = [*region.boxes, *region.inner]
+            inside: list[Box | Region] = [*region.boxes, *region.topics, *region.inner]
             stands_in.update((part.token, by) for part in inside)
     replaced = {token: box.token for token, box in stands_in.items()}
     drawn = tuple(_bundle([*lines, *picture.waits], stands_in, replaced))
+    shown = {line.token for line in drawn}
+    ends_shown = {end: replaced.get(topic, topic) for end, topic in of_topics.items()}
+    replaced = {**{end: by for end, by in ends_shown.items() if end not in shown}, **replaced}
     return Arrangement(root, drawn, tuple(regions.values()), replaced)
+
+
+def _nest(
+    picture: Picture, topics: Collection[str], folded: Collection[str]
+) -> tuple[Region, dict[str, Region]]:
+    """Return the outermost region, and all others by their ids, with the boxes in them."""
+    root, regions = Region(), dict[str, Region]()
+    for box in (*picture.nodes, *picture.channels):
+        region = root
+        for kind, key, title in _list_regions(box):
+            id_ = f'{region.id}/{key}'
+            if id_ not in regions:
+                regions[id_] = Region(f'g{len(regions)}', id_, kind, title, id_ in folded)
+                region.inner.append(regions[id_])
+            region = regions[id_]
+        (region.topics if box.token in topics else region.boxes).append(box)
+    return root, regions
 
 
 def _list_regions(box: Box) -> Iterator[tuple[str, str, str]]:
@@ -109,6 +134,44 @@ def _list_regions(box: Box) -> Iterator[tuple[str, str, str]]:
     for part in filter(None, box.namespace.split('/')):
         full += f'/{part}'
         yield 'namespace', part, full
+
+
+def _list_topic_lines(picture: Picture) -> Iterator[tuple[str, list[Edge]]]:
+    """Yield the tokens and ends of topics that are read best as lines, the publisher first."""
+    ends: dict[str, list[Edge]] = defaultdict(list)
+    # The sort is stable.
+    for edge in sorted(picture.edges, key=lambda edge: edge.role != 'publisher'):
+        ends[edge.channel.token].append(edge)
+    waited_for = {box.token for wait in picture.waits for box in (wait.start, wait.end)}
+    for channel in picture.channels:
+        roles = [end.role for end in ends[channel.token]]
+        nodes = {end.node.token for end in ends[channel.token]}
+        if (
+            channel.kind == 'topic'
+            and not channel.external
+            and channel.token not in waited_for
+            and roles.count('publisher') == 1
+            and 1 < len(roles) == len(nodes) <= 1 + _MOST_SUBSCRIPTIONS
+        ):
+            yield channel.token, ends[channel.token]
+
+
+def _join(ends: Sequence[Edge]) -> Iterator[Edge]:
+    """Yield a line from the publisher of a topic to each subscription; the first is the topic."""
+    publisher, *others = ends
+    topic = publisher.channel
+    for index, end in enumerate(others):
+        parts = (publisher, end) if index else (publisher, topic, end)
+        yield replace(
+            end if index else replace(publisher, token=topic.token),
+            details=tuple(
+                dict.fromkeys((topic.name, *topic.details, *publisher.details, *end.details))
+            ),
+            remarks=tuple(remark for part in parts for remark in part.remarks),
+            mark=_worst(parts),
+            start=publisher.node,
+            end=end.node,
+        )
 
 
 def _bundle(

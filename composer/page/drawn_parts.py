@@ -227,10 +227,13 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
 
 
 def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the data of each line that stands for several."""
+    """Yield the data of each line that stands for several, and is no topic."""
+    behind = defaultdict(list)
+    for part, by in drawn.stands_in.items():
+        if part in parts:
+            behind[by].append(part)
     for line in drawn.lines:
-        near = [part for part, by in drawn.stands_in.items() if by == line.token and part in parts]
-        if near:
+        if (near := behind[line.token]) and line.token not in parts:
             start, end = (parts[box.token] for box in (line.start, line.end))
             id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'
             yield line.token, _part(id_, 'connections', name, line.details, near)

@@ -297,7 +297,9 @@ function choose(token, mustBeSeen) {
   offerMessage();
   offerActs();
   showLog();
-  paint('chosen', chosen === null ? [] : [chosen]);
+  // A topic may be several lines.
+  const lines = parts.get(chosen)?.kind === 'topic' && shapeOf(chosen)?.matches('.edge');
+  paint('chosen', chosen === null ? [] : [chosen, ...lines ? parts.get(chosen).near : []]);
   isolate();
   if (chosen !== null && mustBeSeen) bringIn(shapeOf(token));
 }
@@ -311,11 +313,12 @@ function makeSelectable(token, part) {
     element.querySelector('text').prepend(part.folded ? '▸ ' : '▾ ');
     element.setAttribute('aria-expanded', String(!part.folded));
   }
-  if ('em'.includes(token[0])) {
+  if (element.matches('.edge')) {
     const reach = element.querySelector('path').cloneNode();
     reach.setAttribute('class', 'reach');
     element.append(reach);
-  } else {
+  }
+  if (!'em'.includes(token[0])) {
     element.setAttribute('tabindex', '0');
     element.setAttribute('role', 'button');
     element.setAttribute('aria-label', `${part.kind} ${part.name}`);

@@ -40,20 +40,17 @@ def test_mermaid(draw):
         '  xc1u(("external")):::external',
         '  subgraph g0["/robot"]',
         '    n1(["mapper"]):::node',
-        '    c0["/robot/front/scan<br/>std_msgs/msg/String"]:::topic',
         '    c1["/robot/map<br/>std_msgs/msg/String"]:::topic',
         '    subgraph g1["/robot/front"]',
         '      n0(["lidar"]):::node',
         '    end',
         '  end',
-        "  n0 -->|\"depth 5, best_effort<br/>error: on topic '/robot/front/scan' the QoS<br/>of publisher 'scan' of node 'lidar' and of<br/>subscription 'front/scan' of node 'mapper'<br/>never match: reliability: best_effort is<br/>offered, reliable is requested\"| c0",
-        '  c0 --> n1',
+        "  n0 -->|\"/robot/front/scan<br/>std_msgs/msg/String<br/>depth 5, best_effort<br/>error: on topic '/robot/front/scan' the QoS<br/>of publisher 'scan' of node 'lidar' and of<br/>subscription 'front/scan' of node 'mapper'<br/>never match: reliability: best_effort is<br/>offered, reliable is requested\"| n1",
         '  n1 --> c1',
         '  n2 --> c2',
         '  c1 -.-> xc1u',
         '  n1 -.->|"before"| n2',
         '  linkStyle 0 stroke:#d1242f,stroke-width:3px,color:#d1242f',
-        '  linkStyle 1 stroke:#d1242f,stroke-width:3px,color:#d1242f',
         '  classDef node stroke-width:2px',
         '  classDef process stroke-width:2px,stroke-dasharray:6 3',
         '  classDef external stroke-dasharray:3 3',
@@ -67,14 +64,14 @@ def test_dot(draw):
     assert [line.partition(' [')[0] for line in lines] == [
         'digraph "robot" {',
         *('graph', 'node', 'edge', 'n2', 'c2', 'xc1u', 'subgraph cluster_g0 {', 'graph'),
-        *('n1', 'c0', 'c1', 'subgraph cluster_g1 {', 'graph', 'n0', '}', '}'),
-        *('n0 -> c0', 'c0 -> n1', 'n1 -> c1', 'n2 -> c2', 'c1 -> xc1u', 'n1 -> n2', '}'),
+        *('n1', 'c1', 'subgraph cluster_g1 {', 'graph', 'n0', '}', '}'),
+        *('n0 -> n1', 'n1 -> c1', 'n2 -> c2', 'c1 -> xc1u', 'n1 -> n2', '}'),
     ]
     assert lines[4] == (
         'n2 [label=<<B>alone</B>>, shape=ellipse, style=filled, fillcolor="#ddf4ff", '
         'color="#0969da", id="n2", class="node"]'
     )
-    assert 'class="topic error"' in lines[17]
+    assert 'class="topic error"' in lines[16]
     assert 'class="topic warning"' in lines[5]
 
 
@@ -138,20 +135,17 @@ def test_svg_is_xml_with_the_names_as_they_are(draw, needs_graphviz):
 def test_svg_has_an_element_for_each_part(draw, needs_graphviz):
     root = ET.fromstring(render_picture(draw(SYSTEM), 'svg'))
     classes = {each.get('id'): each.get('class') for each in root.iter() if each.get('id')}
-    assert classes['e0'] == 'edge topic error'
-    assert classes['e1'] == 'edge topic error'
+    assert classes['c0'] == 'edge topic error'
     assert classes['e2'] == 'edge topic'
     assert classes['c2'] == 'node topic warning'
     assert classes['n0'] == 'node node'
-    assert {'g0', 'g1', 'n1', 'n2', 'c0', 'c1', 'e3'} <= set(classes)
+    assert {'g0', 'g1', 'n1', 'n2', 'c1', 'e3'} <= set(classes)
 
 
 def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
     text = html.unescape(render_picture(draw(SYSTEM), 'svg'))
-    assert (
-        '<title>publisher scan of node /robot/front/lidar\nstd_msgs/msg/String\n'
-        'depth 5, best_effort\non topic' in text
-    )
+    assert '<title>topic /robot/front/scan\nstd_msgs/msg/String</title>' in text
+    assert '<title>publisher map of node /robot/mapper\nstd_msgs/msg/String</title>' in text
     assert '<title>topic /robot/map\nstd_msgs/msg/String\nexternal subscriptions</title>' in text
 
 
@@ -161,6 +155,44 @@ def test_without_graphviz_it_says_how_to_get_it(draw, monkeypatch):
     with pytest.raises(ComposerError, match='laid out by Graphviz, which is not') as caught:
         render_picture(draw(SYSTEM), 'svg')
     assert "pip install 'rclpy-composer[graph]'" in caught.value.help
+
+
+BOTH = 'std_msgs/msg/String'
+TALKING = """
+    version: 1
+    nodes:
+      talker: {{publishers: {{words: {publisher}}}}}
+      {others}
+"""
+EAR = '{subscriptions: {words: {type: std_msgs/msg/String, behaviour: "x:y"}}}'
+
+
+@pytest.mark.parametrize(
+    ('publisher', 'others', 'lines'),
+    [
+        (BOTH, [EAR], ['n0 -> n1']),
+        (BOTH, [EAR, EAR], ['n0 -> n1', 'n0 -> n2']),
+        (BOTH, [EAR, EAR, EAR], ['n0 -> c0', 'c0 -> n1', 'c0 -> n2', 'c0 -> n3']),
+        (
+            BOTH,
+            [EAR, '{publishers: {words: std_msgs/msg/String}}'],
+            ['n0 -> c0', 'n2 -> c0', 'c0 -> n1'],
+        ),
+        (f'{{type: {BOTH}, external: true}}', [EAR], ['n0 -> c0', 'c0 -> n1', 'c0 -> xc0u']),
+        (BOTH, [EAR, '{wait_for: [{topic: /words}]}'], ['n0 -> c0', 'c0 -> n1', 'c0 -> n2']),
+        (
+            f'{BOTH}}}, subscriptions: {{words: {{type: {BOTH}, behaviour: "x:y"}}',
+            [],
+            ['n0 -> c0', 'c0 -> n0'],
+        ),
+    ],
+)
+def test_a_topic_of_one_publisher_and_few_subscriptions_is_a_line(draw, publisher, others, lines):
+    nodes = '\n      '.join(f'n_{index}: {each}' for index, each in enumerate(others))
+    text = render_picture(draw(TALKING.format(publisher=publisher, others=nodes)), 'dot')
+    drawn = [line.strip().partition(' [')[0] for line in text.splitlines()]
+    assert [line for line in drawn if '->' in line] == lines
+    assert ('c0' in drawn) is ('n0 -> c0' in lines)
 
 
 PLACED = """
@@ -204,12 +236,9 @@ def test_hosts_and_workers_are_drawn_around_what_they_have(draw):
     assert places == {
         'camera': eyes,
         'tracker': eyes,
-        '/robot/image': eyes,
         'plan': ['host jetson'],
-        '/robot/out': ['host jetson'],
         'driver': ['host jetson'],
         'drive': [],
-        '/cmd': [],
         '/done': [],
         'external': [],
     }

@@ -724,8 +724,9 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
     def names_of(style):
         script = (
             'return [...document.querySelectorAll(arguments[0])].map((each) => each.ariaLabel)'
+            '.filter(Boolean)'
         )
-        return set(browser.execute_script(script, f'main svg .node.{style}'))
+        return set(browser.execute_script(script, f'main svg .{style}'))
 
     browser.get(page.address)
     # A box folds by a click and unfolds by the keyboard; what crosses its border is added up.
