@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.tracing.tracer import TracePart
 
-_EXECUTOR_STOP_SEC = 1.0
+_EXECUTOR_STOP_SEC = 3.0
 # How long a worker that is started again waits for the clients of others, of which some may go.
 _LONGEST_DISCOVERY_SEC = 10.0
 _POLL_SEC = 0.01
@@ -472,22 +472,23 @@ class LocalPart:
         for node in self._nodes.values():
             node.flush_counts()
         self._executor.errors.flush()
-        if ended:
-            self._leave_graph()
-        return ended
+        return ended and self._leave_graph()
 
     def _stop_nodes(self) -> bool:
         """Stop all nodes at the same time; return whether all behaviours ended in time."""
         with self._restarter.lock:
             return stop_nodes(list(self._nodes.values()), self._reading.spec.shutdown_timeout_sec)
 
-    def _leave_graph(self) -> None:
+    def _leave_graph(self) -> bool:
+        """Leave the ROS graph; return whether nothing of the middleware runs any more."""
         self._graph_watcher.stop()
         self._control.stop()
         for node in self._nodes.values():
             self._executor.remove_node(node.ros)
         self._programs.leave_graph()
-        self._executor.stop(_EXECUTOR_STOP_SEC)
+        if not self._executor.stop(_EXECUTOR_STOP_SEC):
+            # A thread that still uses the middleware would crash as it shuts down.
+            return False
         self._hang_watcher.stop()
         release(self._context)
         if not (self._guardian.owns_process and leave_graph_at_exit(self._context, self._nodes)):
@@ -498,6 +499,7 @@ class LocalPart:
         self._context.destroy()
         if not self._guardian.owns_process:
             self._control.release_name()
+        return True
 
     def _kill_processes(self) -> None:
         self._processes.kill_all()
