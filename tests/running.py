@@ -45,7 +45,8 @@ def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
         for peer in _peers:
             peer.check()
         if time.monotonic() > deadline:
-            pytest.fail(f'in vain waited for {what() if callable(what) else what}')
+            known = ''.join(f'; the peer knows {each.known()}' for each in _peers)
+            pytest.fail(f'in vain waited for {what() if callable(what) else what}{known}')
         # What is dear to look at, as a page, is not looked at all the time.
         time.sleep(min(max(_PAUSE_SEC, 3 * (time.monotonic() - looked)), 5 * _PAUSE_SEC))
         looked = time.monotonic()
@@ -287,6 +288,12 @@ class Peer:
         """Raise the error that ended the thread that spins, if one did."""
         if self._end.done():
             self._end.result()
+
+    def known(self):
+        """Return what it has discovered: without the nodes, or without their ends."""
+        topics = dict(self.node.get_topic_names_and_types())
+        ends = {each: len(self.node.get_publishers_info_by_topic(each)) for each in topics}
+        return self.node.get_node_names(), ends
 
     def listen(self, message_class, topic, qos=10):
         """Return a list that grows by each message."""
