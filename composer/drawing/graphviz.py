@@ -57,6 +57,14 @@ _REGIONS = {
 }
 # Texts beside arrows need room along them.
 _RANK_SEPARATIONS = {'LR': 0.7, 'TB': 0.3}
+# More nodes are read without zooming if there are names alone, and little room around them.
+_MOST_DETAILED = 15
+_ROOMY = 'ranksep={}, nodesep=0.2', 'margin="0.12,0.06"', 'margin=8'
+_COMPACT = (
+    'ranksep=0.2, nodesep=0.08',
+    'height=0.2, width=0.2, margin="0.06,0.03"',
+    'margin=4',
+)
 _SMALL, _GREY = 9, '#57606a'
 # Graphviz would look for the best layout of more nodes for minutes: 1,000 that share a topic take
 # four seconds so.
@@ -84,16 +92,34 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
         direction: Of messages, as Graphviz names it: `LR` or `TB`.
     """
     drawn = arrange(picture, folded)
-    separation, fonts = _RANK_SEPARATIONS[direction], f'fontname="{_FONT}", fontsize=11'
+    is_compact = len(picture.nodes) > _MOST_DETAILED
+    separations, margin, inner = _COMPACT if is_compact else _ROOMY
+    separations, fonts = separations.format(_RANK_SEPARATIONS[direction]), f'fontname="{_FONT}"'
     hurry = _HURRIED if len(picture.nodes) > _MOST_NODES else ''
+
+    def draw_region(region: Region, depth: int) -> Iterator[str]:
+        indent = '  ' * depth
+        folded = [each.as_box() for each in region.inner if each.is_folded]
+        for box in (*region.boxes, *folded):
+            yield f'{indent}{box.token} {_look(box, _SHAPES, is_compact=is_compact)}'
+        for each in (each for each in region.inner if not each.is_folded):
+            yield f'{indent}subgraph cluster_{each.token} {{'
+            yield (
+                f'{indent}  graph [label=<{_text(each.title)}>, id="{each.token}", '
+                f'class="{each.kind}", labeljust=l, {inner}, {_REGIONS[each.kind]}]'
+            )
+            yield from draw_region(each, depth + 1)
+            yield f'{indent}}}'
+
     lines = [
         f'digraph {json.dumps(picture.name, ensure_ascii=False)} {{',
-        f'  graph [{hurry}rankdir={direction}, ranksep={separation}, nodesep=0.2, {fonts}]',
-        f'  node [fontname="{_FONT}", fontsize=11, margin="0.12,0.06"]',
-        f'  edge [fontname="{_FONT}", fontsize={_SMALL}, arrowsize=0.7]',
-        *_region(drawn.root, 1),
+        f'  graph [{hurry}rankdir={direction}, {separations}, {fonts}, fontsize=11]',
+        f'  node [{fonts}, fontsize=11, {margin}]',
+        f'  edge [{fonts}, fontsize={_SMALL}, arrowsize=0.7]',
+        *draw_region(drawn.root, 1),
         *(
-            f'  {line.start.token} -> {line.end.token} {_look(line, _LINES)}'
+            f'  {line.start.token} -> {line.end.token} '
+            f'{_look(line, _LINES, is_compact=is_compact)}'
             for line in drawn.lines
         ),
         '}',
@@ -101,29 +127,21 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
     return '\n'.join(lines) + '\n'
 
 
-def _region(region: Region, depth: int) -> Iterator[str]:
-    indent = '  ' * depth
-    folded = [inner.as_box() for inner in region.inner if inner.is_folded]
-    for box in (*region.boxes, *folded):
-        yield f'{indent}{box.token} {_look(box, _SHAPES)}'
-    for inner in (inner for inner in region.inner if not inner.is_folded):
-        yield f'{indent}subgraph cluster_{inner.token} {{'
-        yield (
-            f'{indent}  graph [label=<{_text(inner.title)}>, id="{inner.token}", '
-            f'class="{inner.kind}", labeljust=l, {_REGIONS[inner.kind]}]'
-        )
-        yield from _region(inner, depth + 1)
-        yield f'{indent}}}'
-
-
-def _look(part: Part, styles: Mapping[str, str]) -> str:
-    """Return the attributes of a box or a line; a line shows no name of its own."""
+def _look(part: Part, styles: Mapping[str, str], *, is_compact: bool) -> str:
+    """Return the attributes of a box or a line, which only shows the name of a topic."""
+    topic = getattr(part, 'topic', '')
     lines = [f'<B>{_text(part.name)}</B>'] if isinstance(part, Box) else []
-    lines += [_font(line, _GREY) for line in part.details]
+    lines += [_text(topic)] if topic else []
+    # What stands for several says how many these are.
+    details = part.details if not is_compact or part.token[0] in 'gm' else ()
+    lines += [_font(line, _GREY) for line in details]
     lines += [_font(line, _MARK_COLOURS.get(part.mark, _GREY)) for line in part.remarks]
+    look = styles[part.kind]
+    if is_compact and part.kind == 'node':
+        look = look.replace('shape=ellipse, style=filled', 'shape=box, style="rounded,filled"')
     attributes = [
         f'label=<{"<BR/>".join(lines)}>' if lines else '',
-        styles[part.kind],
+        look,
         _MARKS.get(part.mark, ''),
         f'id="{part.token}"',
         f'class="{part.kind} {part.mark}"' if part.mark else f'class="{part.kind}"',

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.drawing.picture import Box
 from composer.drawing.shapes import arrange
 from composer.terminal import escape
 
@@ -68,8 +67,8 @@ def _region(region: Region, depth: int) -> Iterator[str]:
 
 def _label(part: Part) -> str:
     # A line shows no name of its own.
-    names = (part.name,) if isinstance(part, Box) else ()
-    return '<br/>'.join(map(_escape, (*names, *part.details, *part.remarks)))
+    lines = (getattr(part, 'topic', part.name), *part.details, *part.remarks)
+    return '<br/>'.join(map(_escape, filter(None, lines)))
 
 
 def _escape(text: str) -> str:

@@ -131,6 +131,7 @@ class Edge(Part):
         qos: The policies that differ from the default of ROS; durations in seconds.
         delivery: Which way its messages, calls or goals go.
         by_parameter: The parameters that its name or depth follows, by these keys.
+        topic: The name that it shows, as it is drawn in place of its topic.
     """
 
     start: Box = _NOTHING
@@ -140,6 +141,7 @@ class Edge(Part):
     qos: Mapping[str, Any] = field(default_factory=dict)
     delivery: Delivery = Delivery()
     by_parameter: Mapping[str, str] = field(default_factory=dict)
+    topic: str = ''
 
     @property
     def node(self) -> Box:

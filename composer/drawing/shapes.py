@@ -164,9 +164,8 @@ def _join(ends: Sequence[Edge]) -> Iterator[Edge]:
         parts = (publisher, end) if index else (publisher, topic, end)
         yield replace(
             end if index else replace(publisher, token=topic.token),
-            details=tuple(
-                dict.fromkeys((topic.name, *topic.details, *publisher.details, *end.details))
-            ),
+            details=tuple(dict.fromkeys((*topic.details, *publisher.details, *end.details))),
+            topic=topic.name,
             remarks=tuple(remark for part in parts for remark in part.remarks),
             mark=_worst(parts),
             start=publisher.node,
@@ -195,6 +194,7 @@ def _bundle(
                 line,
                 token=f'm{index}',
                 details=count_kinds(each.role for each in bundle if each.role) or line.details,
+                topic='',
                 remarks=(),
                 mark=_worst(bundle),
             )

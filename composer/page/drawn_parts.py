@@ -43,7 +43,7 @@ _MOST_CODE_LINES = 15
 # The depth of `nodes: {<name>: …}`; every part lies below such an entry.
 _NODE = 2
 # What is left for the drawing in a window of 1440 by 900.
-_STAGE = 680, 850
+_STAGE = 750, 850
 _MOST_FOLDED = 16
 
 

@@ -124,6 +124,23 @@ def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
     assert not any(re.fullmatch(r'e\d+', each) for each in ids if each)
 
 
+def test_many_nodes_are_drawn_with_their_names_alone(draw, needs_graphviz):
+    text = """
+        version: 1
+        nodes:
+          "n_{{ i }}":
+            foreach: {i: "{{ range(%d) }}"}
+            publishers: {"out_{{ i }}": std_msgs/msg/String, all: std_msgs/msg/String}
+            subscriptions: {in: {topic: "out_{{ (i + 3) %% 10 }}", type: std_msgs/msg/String, publish: "out_{{ i }}"}}
+    """
+    for size, is_shown in ((10, True), (20, False)):
+        drawing = Drawing(draw(text % size)).fold(())
+        document = ET.fromstring(drawing['svg'])
+        texts = {each.text for each in document.iter('{http://www.w3.org/2000/svg}text')}
+        assert {'n_3', '/all', '/out_3'} <= texts
+        assert {'std_msgs/msg/String' in texts, 'local' in texts} == {is_shown}
+
+
 FOLDABLE = """
     version: 1
     nodes:
