@@ -45,6 +45,8 @@ _NODE = 2
 # What is left for the drawing in a window of 1440 by 900.
 _STAGE = 750, 850
 _MOST_FOLDED = 16
+# More boxes are not read at once.
+_MOST_SEEN = 100
 
 
 class Excerpt(NamedTuple):
@@ -116,24 +118,27 @@ class Drawing:
 
     def __init__(self, picture: Picture, code: Mapping[str, list[Excerpt]] | None = None) -> None:
         self._picture, self._declared, self._code = picture, picture.channels, code or {}
+        self._first = _fold_many(picture)
         # The one that is read with less zooming stays.
-        self._directions = ['LR', 'TB'] if len(picture.nodes) <= _MOST_NODES_TRIED else ['LR']
+        is_tried = self._first or len(picture.nodes) <= _MOST_NODES_TRIED
+        self._directions = ['LR', 'TB'] if is_tried else ['LR']
         self.name = picture.name
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
         self.topic_of_ends = {edge.id: edge.channel.id for edge in picture.edges}
         self._lock = threading.Lock()
         self._fold = lru_cache(_MOST_FOLDED)(self._describe)
-        self.fold(())
+        self.fold()
 
-    def fold(self, folded: Collection[str]) -> dict[str, Any]:
+    def fold(self, folded: Collection[str] | None = None) -> dict[str, Any]:
         """Return what the page takes: the SVG, and the parts by their tokens.
 
         Args:
-            folded: The ids of the boxes that are folded. The last drawings are kept.
+            folded: The ids of the boxes that are folded; `None` for as many as it takes to read
+                the rest. The last drawings are kept.
         """
         with self._lock:
-            return self._fold(frozenset(folded))
+            return self._fold(frozenset(self._first if folded is None else folded))
 
     def show_outside(self, outside: Mapping[str, list[dict[str, str]]]) -> None:
         """Draw the ends outside of topics from now on, besides those that the files declare.
@@ -172,6 +177,20 @@ class Drawing:
             'parts': parts,
             'findings': findings,
         }
+
+
+def _fold_many(picture: Picture) -> set[str]:
+    """Return the boxes to fold so that not too many are seen, the outer ones unfolded first."""
+    drawn = arrange(picture)
+    folded = {region.id for region in drawn.root.inner}
+    seen = len(drawn.root.boxes) + len(folded)
+    for region in drawn.regions:
+        more = len(region.boxes) + len(region.inner) - 1
+        if region.id in folded and seen + more <= _MOST_SEEN:
+            folded.remove(region.id)
+            folded.update(each.id for each in region.inner)
+            seen += more
+    return folded
 
 
 def _inlined(document: str) -> str:

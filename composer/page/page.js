@@ -429,7 +429,9 @@ async function draw(wanted) {
   const before = chosen;
   wished = wanted ?? wished;
   let selected = wished ?? parts.get(chosen)?.id ?? restore();
-  const words = [...folded].map((id) => `folded=${encodeURIComponent(id)}`).join('&');
+  // Of many nodes, the first drawing folds those of a namespace.
+  const isFirst = !parts.size && !folded.size;
+  const words = isFirst ? '' : ['', ...folded].map((id) => `folded=${encodeURIComponent(id)}`).join('&');
   const drawing = await get(`api/drawing?${words}`);
   // Who folds two boxes in a row sees the second drawing.
   if (turn !== asked) return;
@@ -437,6 +439,7 @@ async function draw(wanted) {
   if (chosen !== before) selected = parts.get(chosen)?.id;
   const hasFocus = svg.contains(document.activeElement);
   parts = new Map(Object.entries(drawing.parts ?? {}));
+  if (isFirst) for (const part of parts.values()) if (part.folded) folded.add(part.id);
   findings = drawing.findings ?? [];
   tokens.clear();
   standsIn = drawing.stands_in ?? {};

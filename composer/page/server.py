@@ -281,7 +281,7 @@ class PageServer:
 
     async def _drawing(self, request: Request) -> Response:
         drawing = self._source.drawing
-        folded = request.query_params.getlist('folded')
+        folded = request.query_params.getlist('folded') or None
         # Graphviz takes a while.
         return _json(await asyncio.to_thread(drawing.fold, folded) if drawing else {})
 

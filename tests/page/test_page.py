@@ -768,6 +768,26 @@ def test_boxes_fold_and_the_address_has_the_view(page, browser):
     assert '#node%3A%2Fear' in browser.current_url
 
 
+def test_of_many_nodes_those_of_inner_namespaces_are_folded_at_first(browser, tmp_path):
+    text = 'version: 1\nnodes:\n'
+    for index in range(110):
+        space = '/a/low' if index % 11 else '/b'
+        text += f'  n_{index}: {{namespace: {space}}}\n'
+    (tmp_path / 'many.yaml').write_text(text)
+    many = Page(0, str(tmp_path / 'many.yaml'))
+    assert len(many.json('/api/drawing')['stands_in']) == 100
+    assert not many.json('/api/drawing?folded=')['stands_in']
+    browser.get(many.address)
+    label = '[aria-label="namespace /a/low"]'
+    wait_for(lambda: find_all(browser, f'{label}[aria-expanded=false]'), 'the folded box')
+    assert find_all(browser, '[aria-label="namespace /b"][aria-expanded=true]')
+    click(browser, f'{label} text')
+    wait_for(lambda: find_all(browser, f'{label}[aria-expanded=true]'), 'the open box')
+    assert len(find_all(browser, 'main svg .node')) == 110
+    browser.get('about:blank')
+    assert many.end() == 130
+
+
 def test_a_browser_shows_it(page, acting, shared_compose, browser):
     from selenium.webdriver import Keys
 
