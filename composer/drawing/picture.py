@@ -145,8 +145,8 @@ class Edge(Part):
 
     @property
     def node(self) -> Box:
-        """The end of it that is a node or process."""
-        return self.start if self.start.kind in ('node', 'process') else self.end
+        """The end of it that is a node or process, or outside."""
+        return self.start if self.start.kind in ('node', 'process', 'external') else self.end
 
     @property
     def channel(self) -> Box:

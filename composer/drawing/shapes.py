@@ -7,6 +7,7 @@ from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 from composer.drawing.picture import Box, Edge, sends
+from composer.entity_kinds import CHANNEL_KINDS
 from composer.names import count_of
 from composer.records import record
 
@@ -75,23 +76,18 @@ def arrange(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
     Args:
         folded: The ids of regions that are drawn as one box.
     """
-    topics = dict(_list_topic_lines(picture))
+    outside = [edge for channel in picture.channels for edge in list_outside(channel)]
+    edges = [*picture.edges, *outside]
+    topics = dict(_list_topic_lines(picture, edges))
     of_topics = {end.token: token for token, ends in topics.items() for end in ends}
     root, regions = _nest(picture, topics, folded)
     lines: list[Edge] = []
-    for edge in picture.edges:
+    for edge in edges:
         if edge.token not in of_topics:
             lines.append(edge)
         elif edge.role == 'publisher':
             lines += _join(topics[of_topics[edge.token]])
-    for channel in picture.channels:
-        for side in channel.external:
-            outside = Box(f'x{channel.token}{side[0]}', 'external', name='external')
-            root.boxes.append(outside)
-            ends = (outside, channel)
-            if not sends(channel.kind, provides=side == 'providers'):
-                ends = (channel, outside)
-            lines.append(Edge(f'{outside.token}l', 'external', start=ends[0], end=ends[1]))
+    root.boxes.extend({edge.node.token: edge.node for edge in outside}.values())
     stands_in: dict[str, Box] = {}
     for region in regions.values():
         # What is in a folded region is drawn by the outermost one.
@@ -105,6 +101,18 @@ def arrange(picture: Picture, folded: Collection[str] = ()) -> Arrangement:
     ends_shown = {end: replaced.get(topic, topic) for end, topic in of_topics.items()}
     replaced = {**{end: by for end, by in ends_shown.items() if end not in shown}, **replaced}
     return Arrangement(root, drawn, tuple(regions.values()), replaced)
+
+
+def list_outside(channel: Box) -> Iterator[Edge]:
+    """Yield a line for each kind of ends outside; all channels share the box of a kind."""
+    for kind in CHANNEL_KINDS:
+        side = 'providers' if kind.provides else 'users'
+        if kind.channel == channel.kind and side in channel.external:
+            box = Box(f'x{kind.channel[0]}{side[0]}', 'external', name=f'external {kind.noun}s')
+            sent = sends(channel.kind, provides=kind.provides)
+            start, end = (box, channel) if sent else (channel, box)
+            token = f'x{channel.token}{side[0]}'
+            yield Edge(token, 'external', start=start, end=end, role=kind.noun)
 
 
 def _nest(
@@ -136,11 +144,11 @@ def _list_regions(box: Box) -> Iterator[tuple[str, str, str]]:
         yield 'namespace', part, full
 
 
-def _list_topic_lines(picture: Picture) -> Iterator[tuple[str, list[Edge]]]:
+def _list_topic_lines(picture: Picture, edges: Iterable[Edge]) -> Iterator[tuple[str, list[Edge]]]:
     """Yield the tokens and ends of topics that are read best as lines, the publisher first."""
     ends: dict[str, list[Edge]] = defaultdict(list)
     # The sort is stable.
-    for edge in sorted(picture.edges, key=lambda edge: edge.role != 'publisher'):
+    for edge in sorted(edges, key=lambda edge: edge.role != 'publisher'):
         ends[edge.channel.token].append(edge)
     waited_for = {box.token for wait in picture.waits for box in (wait.start, wait.end)}
     for channel in picture.channels:
@@ -148,7 +156,6 @@ def _list_topic_lines(picture: Picture) -> Iterator[tuple[str, list[Edge]]]:
         nodes = {end.node.token for end in ends[channel.token]}
         if (
             channel.kind == 'topic'
-            and not channel.external
             and channel.token not in waited_for
             and roles.count('publisher') == 1
             and 1 < len(roles) == len(nodes) <= 1 + _MOST_SUBSCRIPTIONS
@@ -164,6 +171,7 @@ def _join(ends: Sequence[Edge]) -> Iterator[Edge]:
         parts = (publisher, end) if index else (publisher, topic, end)
         yield replace(
             end if index else replace(publisher, token=topic.token),
+            kind='external' if 'external' in (publisher.kind, end.kind) else topic.kind,
             details=tuple(dict.fromkeys((*topic.details, *publisher.details, *end.details))),
             topic=topic.name,
             remarks=tuple(remark for part in parts for remark in part.remarks),

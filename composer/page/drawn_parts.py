@@ -17,7 +17,7 @@ from composer.confidential import may_show_lines
 from composer.diagnostics import describe_finding, relative_path
 from composer.drawing.graphviz import render_svg
 from composer.drawing.picture import Box, Edge, build_picture
-from composer.drawing.shapes import arrange, count_kinds
+from composer.drawing.shapes import arrange, count_kinds, list_outside
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.bindings import node_bindings
@@ -215,6 +215,7 @@ def _parts(
             edges[box.token].append(edge)
     for part in picture.parts:
         kind, near = part.kind, edges[part.token]
+        outside = [*list_outside(part)] if isinstance(part, Box) else []
         if isinstance(part, Edge):
             kind, near = part.role, [part.start, part.end]
         # Of a channel, the lines of its ends.
@@ -224,6 +225,7 @@ def _parts(
         yield (
             part.token,
             {
+                'outside': [token for each in outside for token in (each.token, each.node.token)],
                 **_part(part.id, kind, name, part.facts, [each.token for each in near]),
                 'findings': part.findings,
                 'excerpts': [each._asdict() for each in (*lines, *code.get(part.id, ()))],

@@ -237,7 +237,7 @@ function isolate() {
   svg.classList.toggle('choosing', isolated);
   const found = isolated ? [...reach(chosen)] : [];
   // The ends outside belong to their topics.
-  paint('near', [...found, ...found.flatMap((each) => ['p', 'pl', 'u', 'ul'].map((end) => `x${each}${end}`))]);
+  paint('near', [...found, ...found.flatMap((each) => parts.get(each).outside ?? [])]);
 }
 
 // The address has all of the view: the selection first.

@@ -54,8 +54,9 @@ def test_texts_of_the_file_are_no_markup(data):
 def test_each_part_of_the_data_is_drawn(data):
     assert set(data['parts']) == {'n0', 'n1', 'n2', 'c0', 'c1', 'c2', 'e0', 'e1', 'e2', 'e3'}
     # The ends of a topic with one publisher are drawn as the topic, a line.
-    assert data['stands_in'] == {'e0': 'c0', 'e1': 'c0'}
-    assert set(data['parts']) - {'e0', 'e1'} <= ids_of(data)
+    assert data['stands_in'] == {'e0': 'c0', 'e1': 'c0', 'e2': 'c1', 'xc1u': 'c1'}
+    assert set(data['parts']) - set(data['stands_in']) <= ids_of(data)
+    assert data['parts']['c1']['outside'] == ['xc1u', 'xtu']
     assert data['parts']['e0']['id'] == 'publisher:/talker:words'
 
 

@@ -37,18 +37,16 @@ def test_mermaid(draw):
         'flowchart LR',
         '  n2(["alone"]):::node',
         '  c2["/lonely<br/>std_msgs/msg/String<br/>warning: nothing in this system subscribes<br/>to \'/lonely\'"]:::warning',
-        '  xc1u(("external")):::external',
+        '  xtu(("external subscriptions")):::external',
         '  subgraph g0["/robot"]',
         '    n1(["mapper"]):::node',
-        '    c1["/robot/map<br/>std_msgs/msg/String"]:::topic',
         '    subgraph g1["/robot/front"]',
         '      n0(["lidar"]):::node',
         '    end',
         '  end',
         "  n0 -->|\"/robot/front/scan<br/>std_msgs/msg/String<br/>depth 5, best_effort<br/>error: on topic '/robot/front/scan' the QoS<br/>of publisher 'scan' of node 'lidar' and of<br/>subscription 'front/scan' of node 'mapper'<br/>never match: reliability: best_effort is<br/>offered, reliable is requested\"| n1",
-        '  n1 --> c1',
+        '  n1 -.->|"/robot/map<br/>std_msgs/msg/String"| xtu',
         '  n2 --> c2',
-        '  c1 -.-> xc1u',
         '  n1 -.->|"before"| n2',
         '  linkStyle 0 stroke:#d1242f,stroke-width:3px,color:#d1242f',
         '  classDef node stroke-width:2px',
@@ -63,24 +61,24 @@ def test_dot(draw):
     lines = [line.strip() for line in render_picture(draw(SYSTEM), 'dot').splitlines()]
     assert [line.partition(' [')[0] for line in lines] == [
         'digraph "robot" {',
-        *('graph', 'node', 'edge', 'n2', 'c2', 'xc1u', 'subgraph cluster_g0 {', 'graph'),
-        *('n1', 'c1', 'subgraph cluster_g1 {', 'graph', 'n0', '}', '}'),
-        *('n0 -> n1', 'n1 -> c1', 'n2 -> c2', 'c1 -> xc1u', 'n1 -> n2', '}'),
+        *('graph', 'node', 'edge', 'n2', 'c2', 'xtu', 'subgraph cluster_g0 {', 'graph'),
+        *('n1', 'subgraph cluster_g1 {', 'graph', 'n0', '}', '}'),
+        *('n0 -> n1', 'n1 -> xtu', 'n2 -> c2', 'n1 -> n2', '}'),
     ]
     assert lines[4] == (
         'n2 [label=<<B>alone</B>>, shape=ellipse, style=filled, fillcolor="#ddf4ff", '
         'color="#0969da", id="n2", class="node"]'
     )
-    assert 'class="topic error"' in lines[16]
+    assert 'class="topic error"' in lines[15]
     assert 'class="topic warning"' in lines[5]
 
 
 def test_clients_and_servers_elsewhere_stand_on_their_side(external_ends):
     lines = render_picture(external_ends, 'mermaid').splitlines()
     assert [line.strip() for line in lines if '-.->' in line] == [
-        'c0 -.-> xc0u',
-        'xc1p -.-> c1',
-        'c2 -.-> xc2p',
+        'n0 -.->|"/x<br/>std_msgs/msg/String"| xtu',
+        'xtp -.->|"/y<br/>std_msgs/msg/String"| n0',
+        'c2 -.-> xsp',
     ]
 
 
@@ -136,16 +134,16 @@ def test_svg_has_an_element_for_each_part(draw, needs_graphviz):
     root = ET.fromstring(render_picture(draw(SYSTEM), 'svg'))
     classes = {each.get('id'): each.get('class') for each in root.iter() if each.get('id')}
     assert classes['c0'] == 'edge topic error'
-    assert classes['e2'] == 'edge topic'
+    assert classes['c1'] == 'edge external'
     assert classes['c2'] == 'node topic warning'
     assert classes['n0'] == 'node node'
-    assert {'g0', 'g1', 'n1', 'n2', 'c1', 'e3'} <= set(classes)
+    assert {'g0', 'g1', 'n1', 'n2', 'xtu', 'e3'} <= set(classes)
 
 
 def test_svg_tells_all_of_a_part_where_the_pointer_rests(draw, needs_graphviz):
     text = html.unescape(render_picture(draw(SYSTEM), 'svg'))
     assert '<title>topic /robot/front/scan\nstd_msgs/msg/String</title>' in text
-    assert '<title>publisher map of node /robot/mapper\nstd_msgs/msg/String</title>' in text
+    assert '<title>publisher lonely of node /alone\nstd_msgs/msg/String</title>' in text
     assert '<title>topic /robot/map\nstd_msgs/msg/String\nexternal subscriptions</title>' in text
 
 
@@ -178,7 +176,12 @@ EAR = '{subscriptions: {words: {type: std_msgs/msg/String, behaviour: "x:y"}}}'
             [EAR, '{publishers: {words: std_msgs/msg/String}}'],
             ['n0 -> c0', 'n2 -> c0', 'c0 -> n1'],
         ),
-        (f'{{type: {BOTH}, external: true}}', [EAR], ['n0 -> c0', 'c0 -> n1', 'c0 -> xc0u']),
+        (f'{{type: {BOTH}, external: true}}', [EAR], ['n0 -> n1', 'n0 -> xtu']),
+        (
+            f'{{type: {BOTH}, external: true}}',
+            [EAR, EAR],
+            ['n0 -> c0', 'c0 -> n1', 'c0 -> n2', 'c0 -> xtu'],
+        ),
         (BOTH, [EAR, '{wait_for: [{topic: /words}]}'], ['n0 -> c0', 'c0 -> n1', 'c0 -> n2']),
         (
             f'{BOTH}}}, subscriptions: {{words: {{type: {BOTH}, behaviour: "x:y"}}',
@@ -239,8 +242,7 @@ def test_hosts_and_workers_are_drawn_around_what_they_have(draw):
         'plan': ['host jetson'],
         'driver': ['host jetson'],
         'drive': [],
-        '/done': [],
-        'external': [],
+        'external subscriptions': [],
     }
 
 
