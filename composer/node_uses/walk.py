@@ -79,6 +79,11 @@ _SPINNING = frozenset(
 )
 _METHOD = re.compile(r'^    def ([a-z]\w*)', re.MULTILINE)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
+# Functions that take no `None`.
+_NEEDING = frozenset(
+    f'builtins.{name}'
+    for name in ('enumerate', 'float', 'int', 'len', 'list', 'sorted', 'sum', 'tuple', 'zip')
+)
 # Functions that keep nothing of what they are given.
 _HARMLESS = frozenset(
     f'builtins.{name}'
@@ -236,6 +241,7 @@ class Walk:
             case ast.With() | ast.AsyncWith():
                 self._with(node, scope)
             case ast.For() | ast.AsyncFor():
+                self.need(node.iter, scope)
                 self.visit(node.iter, scope)
                 self.visit(node.target, scope)
                 self._block(node.body, scope)
@@ -362,6 +368,8 @@ class Walk:
         elif isinstance(known, Chain):
             self._note_read(known, value, scope)
         for target in targets:
+            if isinstance(target, ast.Tuple | ast.List):
+                self.need(value, scope)
             self._stored[id(target)] = value
             self.visit(target, scope)
         match targets, value:
@@ -582,6 +590,7 @@ class Walk:
             self._visit_calls(node, scope)
             return
         if isinstance(node, ast.Subscript):
+            self.need(node.value, scope)
             self._subscript(node, scope)
         elif isinstance(node, ast.Attribute):
             self.visit(node.value, scope)
@@ -656,7 +665,9 @@ class Walk:
                     case Chain(path=('node', 'own_state')):
                         self._set_own_state(node.left, scope)
                         operands = [node.left]
-            case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE()]):
+                for each in getattr(container, 'elts', ()):
+                    self._compare_with(node.left, each, scope)
+            case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE(), *_]):
                 for operand in operands:
                     self.need(operand, scope)
             case ast.Compare(ops=[ast.Eq() | ast.NotEq()], comparators=[ast.Constant()]):
@@ -870,12 +881,12 @@ class Walk:
         is_harmless = isinstance(func, External) and func.name in _HARMLESS
         for node in nodes:
             value = self._names.value_of(node, scope)
+            if isinstance(func, External) and func.name in _NEEDING:
+                self.need(node, scope)
             if is_harmless and isinstance(value, Chain) and value.path[0] == 'node':
                 if value.path != ('node',):
                     self._note_read(value, node, scope)
                 continue
-            if isinstance(func, External) and func.name in ('builtins.float', 'builtins.int'):
-                self.need(node, scope)
             self.visit(node, scope)
         if isinstance(func, External) and func.name == waiting.THREAD and scope.waits:
             self._check_target(call, scope)

@@ -18,7 +18,7 @@ from composer.language.bindings import node_bindings
 from composer.node_uses.names import Chain
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource
-from composer.python_source.syntax import FUNCTIONS, count_characters, list_arguments, stored_names
+from composer.python_source.syntax import FUNCTIONS, count_characters, stored_names
 from composer.records import record
 from composer.stubs.message_stubs import StubImports
 from composer.stubs.project_modules import all_nodes
@@ -109,18 +109,6 @@ def _scopes(module: ProjectModule) -> Iterator[tuple[str, list[ast.stmt]]]:
     for top in module.tree.body:
         if isinstance(top, ast.ClassDef):
             yield f'{top.name}.', top.body
-
-
-def changed_names(function: FunctionNode) -> set[str]:
-    """Return the names that a function assigns, and the parameters of functions inside it."""
-    functions = (each for each in ast.walk(function) if isinstance(each, (*FUNCTIONS, ast.Lambda)))
-    inner = {
-        each.arg
-        for node in functions
-        if node is not function
-        for each in list_arguments(node.args)
-    }
-    return stored_names(function) | inner
 
 
 # The annotations that say less than the class of the node.
@@ -227,7 +215,7 @@ class Annotator:
 
     def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
         arguments = use.definition.args
-        changed = changed_names(use.definition)
+        changed = stored_names(use.definition)
         for each in (*arguments.posonlyargs, *arguments.args):
             received = use.received.get(each.arg)
             wanted = self._annotation(received) if received else None

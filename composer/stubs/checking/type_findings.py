@@ -22,7 +22,13 @@ from composer.node_uses.message_uses import explain_unknown
 from composer.node_uses.names import assignments, find_stored
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
-from composer.python_source.syntax import owner_of, positional_names, words_in
+from composer.python_source.syntax import (
+    list_arguments,
+    owner_of,
+    positional_names,
+    stored_names,
+    words_in,
+)
 from composer.records import record
 from composer.spelling import did_you_mean, is_typo, suggest
 from composer.stubs.checking.left_alone import ReportedPlace
@@ -62,6 +68,7 @@ _LITERAL = re.compile(r"Literal\[('[^']*'|-?\d+|True|False|b'[^']*')\]")
 _DICT = re.compile(r'^dict\[str, (.*)\]$')
 # A time of rclpy, which a message has beside it.
 _TIME = re.compile(r'^rclpy\.\w+\.(Time|Duration)$')
+_TIME_MESSAGE = re.compile(r'^builtin_interfaces\.msg\.(\w+)$')
 _UNARY = re.compile(r'Type `([^`]+)` is not iterable')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
 _ITEMS = re.compile(r'(?:list|set|tuple)\[([^\[\],]+)\]')
@@ -73,12 +80,22 @@ _PARTS = {
     'Goal': 'a goal',
     'Time': 'a time',
     'Duration': 'a duration',
+    'End': 'a subscription',
+    'Publisher': 'a publisher',
+}
+# What arguments of the node's methods may be.
+_TAKEN = {
+    'behaviour': 'a function',
+    'qos': 'a depth, the name of a profile, a mapping or a QoSProfile',
 }
 _INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
+# From a name to what it stands for, at most.
+_MOST_STEPS = 6
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
 _TIMES = frozenset({'Time', 'Duration'})
+_TIME_MESSAGES = {f'msg.{each}': f'builtin_interfaces/msg/{each}' for each in sorted(_TIMES)}
 # Functions and modules whose types are those of Python itself.
 _OF_PYTHON = frozenset({*dir(builtins), *sys.stdlib_module_names})
 # Classes of Python, of which fields and parameters are.
@@ -184,7 +201,7 @@ class TypeFindings:
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
         node, meant = next(found, None), _MEANT.search(place.report.message)
-        if name.startswith('_') or name in place.copy.asked:
+        if name.startswith('__' if owner in self.own else '_') or name in place.copy.asked:
             return None
         if not isinstance(node, ast.Attribute) or isinstance(node.ctx, ast.Del):
             return None
@@ -193,7 +210,7 @@ class TypeFindings:
         is_part = owner in ('Coroutine', *_PARTS)
         if owner in self.own or not (is_part or owner in self.messages or of_node in self.nodes):
             # A class of the project, or of Python: only what is misspelt is certain.
-            is_typo_of = meant and name not in self.defined and is_typo(name, meant[1])
+            is_typo_of = meant and name not in self.defined and _is_misspelt(name, meant[1])
             # What a name of the state stands for may change.
             is_value = owner in _SCALARS and '.state.' not in ast.unparse(node)
             if is_value and isinstance(node.value, ast.Attribute):
@@ -206,7 +223,7 @@ class TypeFindings:
                 advice = f"write {owner}['{name}']"
             elif not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
                 return None
-            advice = OF_RCLPY.get(name, advice)
+            advice = self._place_of_constant(owner, name) or OF_RCLPY.get(name, advice)
             return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
         if not self._is_of_one_type(place, node.value):
             return None
@@ -224,25 +241,36 @@ class TypeFindings:
         return node, rule, message, advice
 
     def _is_set_by_nobody(self, place: ReportedPlace, owner: str, node: ast.Attribute) -> bool:
-        """Return whether an attribute of the object itself is set nowhere in the project.
+        """Return whether an attribute of the object itself, or a constant, is set nowhere.
 
         The object is made of just this class, as the file names it.
         """
         module, function = place.copy.module, place.function
+        if {node.attr, ''} & self.defined:
+            return False
+        classes = [each for each in ast.walk(module.tree) if isinstance(each, ast.ClassDef)]
+        own = [each for each in classes if each.name == owner]
+        if node.attr.isupper() and place.report.message.startswith('Class '):
+            # Of a class that the project writes out, or of the type of a service or an action.
+            return bool(own or _INTERFACE.search(module.source.imports.get(owner, '')))
         names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
         bound = {(each.module, each.class_name) for each in names}
         receiver = function.args.args[0].arg if function and function.args.args else None
-        classes = [each for each in ast.walk(module.tree) if isinstance(each, ast.ClassDef)]
         bases = {getattr(base, 'id', '') for each in classes for base in each.bases}
-        own = [each for each in classes if each.name == owner]
         return (
             (module.name, owner) in bound
             and owner not in bases
             and getattr(node.value, 'id', '') == receiver
-            and not {node.attr, ''} & self.defined
             and any(function in each.body for each in own)
             and not any(each.decorator_list for each in own)
         )
+
+    def _place_of_constant(self, owner: str, name: str) -> str | None:
+        """Return the help for a constant that a part of a service or an action has."""
+        for part in ('Goal', 'Result', 'Feedback', 'Request', 'Response'):
+            if name in self.context.types.constants(self.messages.get(f'{owner}_{part}', '')):
+                return f'write {owner}.{part}.{name}'
+        return None
 
     def _name_of(self, owner: str) -> str:
         return next(iter(self.nodes[owner].values())).name
@@ -262,7 +290,11 @@ class TypeFindings:
 
     def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value is no union, of which reports name the part that does not fit."""
-        if self._is_declared(place, value):
+        if (
+            self._is_declared(place, value)
+            or _is_annotated(place, value)
+            or _is_time(place, value)
+        ):
             return True
         value = owner_of(value)
         value = value.value if isinstance(value, ast.Await) else value
@@ -353,10 +385,14 @@ class TypeFindings:
             func = call.func
             is_certain = isinstance(func, ast.Attribute) and self._is_declared(place, func)
         if package in ('composer', 'composer_stubs'):
+            message = f"{method}() takes {_TAKEN.get(parameter, wanted)} as '{parameter}', got "
+            if parameter == 'behaviour' and isinstance(value, ast.Call) and '|' not in given:
+                function = ast.unparse(value.func)
+                message += f'what {function}() returns'
+                return value, 'bad-call', message, f'give the function itself: {function}'
             if names is None or not (is_certain or isinstance(value, ast.Constant)):
                 return None
-            message = f"{method}() takes {wanted} as '{parameter}', got {self._shown(given)}"
-            return value, 'bad-call', message, None
+            return value, 'bad-call', f'{message}{self._shown(given)}', None
         # Functions of the same module have no module before their names.
         if function in self.defined or package in {
             each.partition('.')[0] for each in self.modules
@@ -480,6 +516,7 @@ class TypeFindings:
             return None
         is_wrong = self._is_other_message(field.type, given, is_stored=is_stored)
         is_single = not field.type.array and (is_stored or not field.type.nested)
+        is_wrong |= is_stored and given == 'None' and isinstance(value, ast.Constant)
         is_wrong |= is_single and _COLLECTION.fullmatch(given) is not None
         names = _certain(given)
         fits = not names or any(self._fits(field.type, each, is_stored) for each in names)
@@ -503,7 +540,7 @@ class TypeFindings:
         if given in _TIMES:
             return is_stored and not field_type.array
         if not self._is_message(given) or field_type.array:
-            return is_stored and self._is_message(given)
+            return self._is_message(given)
         nested = self.context.types.describe(field_type.nested) if field_type.nested else None
         is_other = nested and len(nested.fields) > 1 and nested.name != self.messages[given]
         return bool(is_other) or not field_type.nested
@@ -542,14 +579,18 @@ class TypeFindings:
         if match and match[4] == '__init__':
             value = [*place.values, *place.calls][0]
             return self._unknown_field(f'{match[1]}/{match[2]}/{match[3]}', keyword[1], value)
-        if not function[1].startswith(('composer_stubs.', 'composer.')):
+        if not function[1].startswith(('composer_stubs.', 'composer.', 'rclpy.')):
             return None
-        method = function[1].rpartition('.')[2]
+        method = function[1].removesuffix('.__init__').rpartition('.')[2]
         return place.calls[0], 'bad-call', f"{method}() takes no argument '{keyword[1]}'", None
 
     def _count(self, place: ReportedPlace) -> _Problem | None:
         function = _FUNCTION.search(place.report.message)
         match = _MESSAGE.match(function[1]) if function else None
+        time = _TIME.match(function[1].removesuffix('.__init__')) if function else None
+        if time and place.calls:
+            advice = f'write {time[1]}(seconds=…)'
+            return place.calls[0], 'bad-call', f'{time[1]} takes its values by name only', advice
         if function and function[1].startswith('composer_stubs.Logger.') and place.calls:
             advice = "put the values into it: f'{value}'"
             return place.calls[0], 'bad-call', 'the logger takes one text', advice
@@ -567,7 +608,8 @@ class TypeFindings:
             return None
         given = [match[2], match[3]]
         given = [_LITERAL.sub(_type_of_literal, each).partition('[')[0] for each in given]
-        known = {*_TIMES, *self.messages} - self.own
+        given = [_TIME.sub(r'\1', _TIME_MESSAGE.sub(r'msg.\1', each)) for each in given]
+        known = {*_TIMES, *_TIME_MESSAGES, *self.messages} - self.own
         if not {*given} <= _PLAIN_OWNERS | known:
             return None
         parts = [node for node in ast.iter_child_nodes(values[0]) if isinstance(node, ast.expr)]
@@ -575,9 +617,12 @@ class TypeFindings:
         is_certain = self._is_of_one_type if {*given} & known else self._is_declared
         if not all(is_certain(place, part) for part in parts):
             return None
-        left, right = (_PARTS.get(each) or self._shown(each) for each in given)
+        shown = _PARTS | _TIME_MESSAGES
+        left, right = (shown.get(each) or self._shown(each) for each in given)
         message = f"'{match[1]}' is not possible between {left} and {right}"
-        return values[0], 'bad-call', message, None
+        stamps = [each for each in given if each in _TIME_MESSAGES]
+        advice = f'write {stamps[0][4:]}.from_msg(…)' if stamps else None
+        return values[0], 'bad-call', message, advice
 
     def _bound(self, place: ReportedPlace) -> _Problem | None:
         """Return a message that a function compares, as `min` does."""
@@ -648,6 +693,11 @@ class TypeFindings:
         return found[0], 'never-equal', message, None
 
 
+def _is_misspelt(name: str, meant: str) -> bool:
+    """Return whether a name looks like another one; `_name` of Python is no `name`."""
+    return is_typo(name, meant) and name.startswith('_') == meant.startswith('_')
+
+
 def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
     """Return whether an expression has the one type that the stubs give it."""
     match value:
@@ -660,6 +710,46 @@ def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
         case ast.Call(func=ast.Attribute()) | ast.Attribute() | ast.BinOp():
             return not words_in(value) & {'self', 'cls'}
     return False
+
+
+def _is_time(place: ReportedPlace, value: ast.AST | None) -> bool:
+    """Return whether a value is what the clock of the node says, or comes of that."""
+    for _ in range(_MOST_STEPS):
+        match value:
+            case ast.BinOp(left=left):
+                value = left
+            case ast.Call(func=ast.Attribute(attr='now')):
+                return True
+            case ast.Name(id=name):
+                sources = _sources(place, name) or []
+                value = sources[0][0] if len(sources) == 1 else None
+            case _:
+                return False
+    return False
+
+
+def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
+    """Return whether the project annotates what a value is of, with the name of one class."""
+    while isinstance(value, ast.Attribute) and not isinstance(value.value, ast.Name):
+        value = value.value
+    written: list[ast.expr | None] = []
+    function, root = place.function, getattr(value, 'value', value)
+    if (
+        function is not None
+        and isinstance(root, ast.Name)
+        and root.id not in stored_names(function)
+    ):
+        arguments = list_arguments(function.args)
+        written = [each.annotation for each in arguments if each.arg == root.id]
+    if not any(written) and isinstance(value, ast.Attribute):
+        classes = (each for each in place.around if isinstance(each, ast.ClassDef))
+        written = [
+            each.annotation
+            for each in ast.walk(next(classes, ast.Pass()))
+            if isinstance(each, ast.AnnAssign) and ast.unparse(each.target) == ast.unparse(value)
+        ]
+    names = [words_in(each) - {'None', 'Optional'} for each in written if each is not None]
+    return bool(names) and all(len(each) == 1 for each in names)
 
 
 def _sources(place: ReportedPlace, name: str) -> list[Stored] | None:

@@ -106,6 +106,9 @@ def _message_classes(files: dict[str, str]) -> dict[str, str]:
         package, kind, *rest = path.split('/')
         if rest and kind in ('msg', 'srv', 'action'):
             for name in _CLASS.findall(text):
+                if kind != 'msg' and '_' not in name:
+                    # The type itself, which holds its messages.
+                    continue
                 names[name] = '' if name in names else f'{package}/{kind}/{name}'
     return names
 

@@ -53,6 +53,7 @@ def test_a_publisher_that_is_taken_is_used(check, line):
         ("print(node.ros.declare_parameter('sped', 1), node.parameters.sped)", []),
         ("print(node.parameters.gear == 'high')", ['never-equal']),
         ("print(self.node.parameters.gear == 'high')", ['never-equal']),
+        ("print(node.parameters.gear in ('low', 'high'))", ['never-equal']),
         ("match node.parameters.gear:\n            case 'low' | 'high': pass", ['never-equal']),
         ("print(node.parameters.gear == 'fast')", []),
         ("try: print(node.parameters.gear == 'high')\n        except KeyError: pass", []),
