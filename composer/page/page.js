@@ -682,7 +682,7 @@ function showLive() {
   const outside = part?.kind === 'topic' ? listOutside(part.id.slice(6)) : [];
   if (!found.length) { live.replaceChildren(...outside); return; }
   const table = make('table');
-  const titles = ['Hz', '', 'ms', 'p99', 'core %', 'queue', 'drops', 'late', 'errors'];
+  const titles = ['Hz', '', 'p50 ms', 'p99', 'core %', 'queue', 'drops', 'late', 'errors'];
   const header = make('tr');
   for (const title of titles) header.append(make('th', title));
   table.append(header);
@@ -695,13 +695,15 @@ function showLive() {
     const name = make('td', `${row.kind} ${row.name}`);
     name.colSpan = titles.length;
     about.append(name);
-    const way = [row.delivery, row.delivery_reason].filter(Boolean).join(', ');
+    const onTheWay = typeof row.delivery_p50_ms === 'number'
+      && `${number(row.delivery_p50_ms, 2)} ms on the way, p99 ${number(row.delivery_p99_ms, 2)} ms`;
+    const way = [row.delivery, row.delivery_reason, onTheWay].filter(Boolean).join(', ');
     if (way) name.append(make('br'), make('span', way, 'kind'));
     if (levelOf(row) !== 'ok' && row.message) name.append(make('br'), make('span', row.message));
     const spark = make('td');
     spark.append(sparkline(rates.get(keyOf(row)) ?? []));
     line.append(make('td', number(row.rate_hz)), spark);
-    const cells = [number(row.mean_ms, 2), number(row.p99_ms, 2),
+    const cells = [number(row.p50_ms, 2), number(row.p99_ms, 2),
       row.cpu === null ? '–' : number(100 * row.cpu), number(row.queued, 0), number(row.dropped, 0),
       number(row.late, 0), number(row.errors, 0)];
     for (const cell of cells) line.append(make('td', cell));

@@ -52,7 +52,8 @@ TOP: Final[Form] = {
     'entities': [
         {
             **dict.fromkeys(('node', 'worker', 'kind', 'name', 'key'), str),
-            **dict.fromkeys(('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued'), _FIGURE),
+            **dict.fromkeys(('rate_hz', 'mean_ms', 'p50_ms', 'p99_ms', 'max_ms'), _FIGURE),
+            **dict.fromkeys(('delivery_p50_ms', 'delivery_p99_ms', 'cpu', 'queued'), _FIGURE),
             **dict.fromkeys(('errors', 'dropped', 'late', 'skipped'), float),
             'delivery': (NoneType, str),
             'delivery_reason': str,

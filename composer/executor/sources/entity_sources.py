@@ -2,7 +2,7 @@
 
 import inspect
 import threading
-from time import monotonic_ns
+from time import monotonic_ns, time_ns
 from typing import Any, Protocol
 
 import rclpy.exceptions
@@ -33,7 +33,13 @@ class TickObserver(Protocol):
 
 
 class QueueObserver(Protocol):
-    """Is told what comes to a subscription, and what is taken."""
+    """Is told what comes to a subscription, and what is taken.
+
+    Attributes:
+        times_deliveries: Whether it is told how long messages were on their way.
+    """
+
+    times_deliveries: bool
 
     def on_announced(self, count: int | None) -> None:
         """Note that `count` messages came; None: nobody knows how many."""
@@ -43,6 +49,9 @@ class QueueObserver(Protocol):
 
     def note_nothing_taken(self, begun: int) -> None:
         """Note that nothing was there."""
+
+    def note_delivery(self, duration_ns: int) -> None:
+        """Note how long a message was on its way, from its publisher to the callback."""
 
 
 class LocalRequest(Protocol):
@@ -210,9 +219,17 @@ class SubscriptionSource(EventSource):
                 taken = [local.popleft()]
             except IndexError:
                 return NOTHING  # Another thread took it.
+            if self.observer is not None and self.observer.times_deliveries:
+                self._note_local_delivery(id(taken[0]))
             result = callback(taken.pop())
             return result if result is not None and self._is_async(callback) else None
         return self._run_taken()
+
+    def _note_local_delivery(self, message: int) -> None:
+        put_ns = None if self.inbox is None else self.inbox.put_ns
+        begun_ns = None if put_ns is None else put_ns.pop(message, None)
+        if begun_ns is not None:
+            self.observer.note_delivery(monotonic_ns() - begun_ns)
 
     def _limit_local(self) -> None:
         """Push out what one queue would not hold beside what the middleware has."""
@@ -243,6 +260,8 @@ class SubscriptionSource(EventSource):
                 observer.note_nothing_taken(arrived)
             self._note_nothing_taken(revision)
             return NOTHING
+        if observer is not None and observer.times_deliveries:
+            observer.note_delivery(max(0, time_ns() - taken[1]['source_timestamp']))
         event_fd = self.event_fd
         if event_fd is not None and event_fd.is_shared:
             self._note_taken()  # Without the check, each message would cost a call.

@@ -5,7 +5,10 @@ from __future__ import annotations
 import threading
 from collections import deque
 from contextlib import suppress
+from time import monotonic_ns
 from typing import Any
+
+_MOST_TIMES = 10_000
 
 
 class Inbox:
@@ -21,15 +24,17 @@ class Inbox:
         messages: The oldest first.
         source: The `EventSource` that takes them, while an executor listens to the entity.
         overruns: How many were pushed out.
+        put_ns: When those that wait were put here, by their `id`; `None` if nobody asks.
     """
 
-    __slots__ = ('_heir', '_passing_on', 'depth', 'messages', 'overruns', 'source')
+    __slots__ = ('_heir', '_passing_on', 'depth', 'messages', 'overruns', 'put_ns', 'source')
 
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque(maxlen=depth)
         self.source: Any = None
         self.overruns = 0
+        self.put_ns: dict[int, int] | None = None
         self._heir: Inbox | None = None
         self._passing_on = threading.RLock()
 
@@ -38,12 +43,20 @@ class Inbox:
         messages = self.messages
         if len(messages) == self.depth:
             self.overruns += 1
+        if self.put_ns is not None:
+            self._note_time(self.put_ns, message)
         messages.append(message)
         if self._heir is not None:
             self.pass_on(self._heir)
         source = self.source
         if source is not None:
             source.parts.scheduler.add_events(source, 0)
+
+    def _note_time(self, put_ns: dict[int, int], message: Any) -> None:
+        if len(put_ns) > _MOST_TIMES:
+            # Those that were pushed out are not taken.
+            put_ns.clear()
+        put_ns[id(message)] = monotonic_ns()
 
     def pass_on(self, heir: Inbox) -> None:
         """Move what waits to the end of another queue, and all that is still put here."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from composer.planning.snapshot import Snapshot
     from composer.runtime.costs.process_costs import ProcessCosts
+    from composer.runtime.health.call_times import CallTimes
     from composer.runtime.health.deliveries import Deliveries, Delivery
     from composer.runtime.health.diagnostics_publisher import DiagnosticsPublisher
     from composer.runtime.health.statistics import EntityKey, EntityReport
@@ -27,7 +28,7 @@ _WORKER_STATES = {
     'restarting': 'it has ended, and is started again',
     'no answer': 'it does not answer',
 }
-_P99 = 0.99
+_P50, _P99 = 0.5, 0.99
 _NS_PER_MS = 1e6
 
 
@@ -168,8 +169,10 @@ def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
         'message': message,
         'rate_hz': calls / report.period_sec,
         'mean_ms': times.mean_ns() / _NS_PER_MS if calls else None,
+        'p50_ms': times.percentile_ns(_P50) / _NS_PER_MS if calls else None,
         'p99_ms': times.percentile_ns(_P99) / _NS_PER_MS if calls else None,
         'max_ms': times.most_ns / _NS_PER_MS if calls else None,
+        **_delivery_times(report.deliveries),
         'cpu': report.cpu,
         'queued': report.queued,
         'calls': report.all_calls,
@@ -182,6 +185,16 @@ def _describe_entity(key: EntityKey, report: EntityReport) -> dict[str, Any]:
     }
 
 
+def _delivery_times(deliveries: CallTimes | None) -> dict[str, float | None]:
+    """Return how long messages were on their way, from the publisher to the callback."""
+    if not (deliveries and deliveries.calls()):
+        return {'delivery_p50_ms': None, 'delivery_p99_ms': None}
+    return {
+        'delivery_p50_ms': deliveries.percentile_ns(_P50) / _NS_PER_MS,
+        'delivery_p99_ms': deliveries.percentile_ns(_P99) / _NS_PER_MS,
+    }
+
+
 def _describe_delivery(
     key: EntityKey, delivery: Delivery, rates: Mapping[EntityKey, float]
 ) -> dict[str, Any]:
@@ -191,7 +204,8 @@ def _describe_delivery(
 
 def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[str, Any]:
     node, owner = key
-    unknown = ('rate_hz', 'mean_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
+    unknown = ('rate_hz', 'mean_ms', 'p50_ms', 'p99_ms', 'max_ms', 'cpu', 'queued')
+    ways = ('delivery_p50_ms', 'delivery_p99_ms')
     none = ('calls', 'errors', 'dropped', 'late', 'skipped')
     return {
         'node': node,
@@ -200,7 +214,7 @@ def _describe_figureless(key: EntityKey, way: str | None, reason: str) -> dict[s
         'key': owner.key,
         'level': _LEVELS[0],
         'message': '',
-        **dict.fromkeys(unknown),
+        **dict.fromkeys((*unknown, *ways)),
         **dict.fromkeys(none, 0),
         'delivery': way,
         'delivery_reason': reason,

@@ -8,6 +8,8 @@ from rclpy.timer import Timer
 
 from composer.executor.sources.inbox import Inbox
 from composer.records import record
+from composer.runtime.costs.call_meter import call_meter
+from composer.runtime.health.call_times import CallTimes
 from composer.runtime.health.watched_clocks import WallClock
 from composer.runtime.tracing.tracer import tracer
 
@@ -54,9 +56,12 @@ class MissedNothing:
     Attributes:
         node: The full name of the entity's node.
         what: What a trace calls the entity.
+        deliveries: How long messages were on their way, from their publishers to the callback,
+            while somebody looks; `None` of what gets none.
     """
 
     node = what = ''
+    deliveries: CallTimes | None = None
 
     def __call__(self) -> MissedCounts:
         """Return what it has missed."""
@@ -134,9 +139,16 @@ class QueueOverruns(MissedNothing):
         self._taken = 0
         self._overruns = 0
         self._is_counting = True
+        self.times_deliveries = False
+        self.deliveries = deliveries = CallTimes(has_cpu=False)
+        self.note_delivery = deliveries.add
 
     def __call__(self) -> MissedCounts:
         """Return what it has missed."""
+        if self.times_deliveries != call_meter.is_on:
+            self.times_deliveries = call_meter.is_on
+            if self._inbox is not None:
+                self._inbox.put_ns = {} if self.times_deliveries else None
         if self._depth:
             # A queue that never runs empty: the middleware holds no more than its depth.
             self._note_overruns(self._arrived - self._taken - self._depth)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from composer.records import record
 from composer.runtime.behaviours.tracebacks import summarize
 from composer.runtime.costs.call_meter import call_meter
+from composer.runtime.health.call_times import CallTimes
 from composer.runtime.health.missed import MissedCounts
 
 if TYPE_CHECKING:
@@ -20,85 +21,10 @@ if TYPE_CHECKING:
 
     from composer.runtime.behaviours.running_calls import Owner, RunningCall
 
-# Durations are sorted into 8 buckets for each power of two; none is narrower than 256 ns.
-_UNIT_BITS = 8
-_SUB_BITS = 3
-
 # The full name of a node, and an entity in it.
 EntityKey: TypeAlias = 'tuple[str, Owner]'
 
 _NONE_MISSED = MissedCounts()
-
-
-class CallTimes:
-    """How long calls took, each to within an eighth.
-
-    Attributes:
-        counts: Calls by bucket; most entities use few of them.
-        cpu_ns: What they cost the processor, while `call_meter` is on.
-    """
-
-    __slots__ = ('counts', 'cpu_ns', 'most_ns', 'total_ns')
-
-    def __init__(self) -> None:
-        self.counts: dict[int, int] = {}
-        self.cpu_ns = 0
-        self.total_ns = 0
-        self.most_ns = 0
-
-    def add(self, duration_ns: int) -> None:
-        """Count a call that has ended."""
-        if call_meter.is_on:
-            call_meter.charge(self, duration_ns)
-        units = duration_ns >> _UNIT_BITS
-        shift = units.bit_length() - _SUB_BITS - 1
-        bucket = (shift << _SUB_BITS) + (units >> shift) if shift > 0 else units
-        # Nothing is called from here on.
-        counts = self.counts
-        if bucket in counts:
-            counts[bucket] += 1
-        else:
-            counts[bucket] = 1
-        self.total_ns += duration_ns
-        if duration_ns > self.most_ns:  # noqa: PLR1730 - `max` would be a call
-            self.most_ns = duration_ns
-
-    def take(self) -> CallTimes:
-        """Return all counts so far, and start again with none."""
-        taken = CallTimes()
-        # Nothing is called from here on.
-        taken.counts, self.counts = self.counts, taken.counts
-        taken.cpu_ns, self.cpu_ns = self.cpu_ns, 0
-        taken.total_ns, self.total_ns = self.total_ns, 0
-        taken.most_ns, self.most_ns = self.most_ns, 0
-        return taken
-
-    def calls(self) -> int:
-        """Return the number of calls."""
-        return sum(self.counts.values())
-
-    def mean_ns(self) -> float:
-        """Return the mean duration; 0 if there were no calls."""
-        return self.total_ns / (self.calls() or 1)
-
-    def percentile_ns(self, share: float) -> int:
-        """Return the duration that this share of the calls kept to, up to an eighth too high.
-
-        Args:
-            share: More than 0, as in 0.99.
-        """
-        left = share * self.calls()
-        for bucket in sorted(self.counts):
-            left -= self.counts[bucket]
-            if left <= 0:
-                return min(_last_ns(bucket), self.most_ns)
-        return self.most_ns
-
-
-def _last_ns(bucket: int) -> int:
-    """Return the longest duration of a bucket."""
-    shift = max((bucket >> _SUB_BITS) - 1, 0)
-    return ((bucket - (shift << _SUB_BITS) + 1) << shift << _UNIT_BITS) - 1
 
 
 @record
@@ -113,6 +39,7 @@ class EntityReport:
         missed: What it missed in the period.
         overdue_sec: How long a call has been running that exceeds `warn_after`; 0 if none does.
         queued: How many messages wait for it.
+        deliveries: How long messages were on their way to it; `None` if that was not measured.
         all_calls: Since the start, as the next two.
         is_measured: Whether the processor time of its calls was measured.
     """
@@ -128,6 +55,7 @@ class EntityReport:
     all_errors: int
     all_missed: MissedCounts
     is_measured: bool = False
+    deliveries: CallTimes | None = None
 
     @property
     def cpu(self) -> float | None:
@@ -147,6 +75,7 @@ class EntityHealth:
         '_calls',
         '_count_missed',
         '_count_queued',
+        '_deliveries',
         '_errors',
         '_last_error',
         '_missed',
@@ -163,6 +92,7 @@ class EntityHealth:
         self._last_error = ''
         self._count_missed: Callable[[], MissedCounts] = MissedCounts
         self._count_queued: Callable[[], int] = int
+        self._deliveries: CallTimes | None = None
         self._past = self._missed = self._all_missed = _NONE_MISSED
         self._reported = 0, _NONE_MISSED
         self._rests = False
@@ -173,16 +103,21 @@ class EntityHealth:
         self._last_error = summarize(error)
 
     def follow(
-        self, count_missed: Callable[[], MissedCounts], count_queued: Callable[[], int] = int
+        self,
+        count_missed: Callable[[], MissedCounts],
+        count_queued: Callable[[], int] = int,
+        deliveries: CallTimes | None = None,
     ) -> None:
         """Ask here from now on what it has missed, because its node was created or restarted.
 
         Args:
             count_queued: Returns how many messages wait for it.
+            deliveries: How long they were on their way, which is emptied with each report.
         """
         self._update_missed()
         self._past, self._missed = self._all_missed, _NONE_MISSED
         self._count_missed, self._count_queued = count_missed, count_queued
+        self._deliveries = deliveries
 
     def rest(self, *, rests: bool) -> None:
         """Do not count what it misses from now on, as it is told to; or count it again."""
@@ -217,6 +152,7 @@ class EntityHealth:
             all_errors=errors,
             all_missed=missed,
             is_measured=is_measured,
+            deliveries=self._deliveries and self._deliveries.take(),
         )
 
     def _update_missed(self) -> None:

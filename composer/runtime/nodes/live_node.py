@@ -341,7 +341,7 @@ class LiveNode:
         counter = count_missed(self.system.executor, self.ros, entity, inbox, str(owner))
         counter.node = self.full_name
         health = self.counted[owner] = self._health(owner)
-        health.follow(counter, counter.queued)
+        health.follow(counter, counter.queued, counter.deliveries)
         health.rest(rests=self.gate.rests)
 
     def rest_counts(self, *, rests: bool) -> None:

@@ -108,3 +108,26 @@ def test_the_way_and_the_rate_are_told_and_change_in_place(compose, peer, wait_f
     assert run(['reload']) == 0
     assert '~1 publisher' in capsys.readouterr()[0]
     assert deliveries()['near'] == ('sent', 'local_delivery: false')
+
+
+def test_how_long_messages_were_on_their_way_is_told_while_somebody_looks(
+    compose, wait_for, capsys
+):
+    # Those of either way wait for a callback that takes longer than the period.
+    slow = CODE.replace('    pass\n', '    time.sleep(0.05)\n')
+    child = compose(SYSTEM, 'import time\n' + slow)
+    child.wait_until_ready()
+
+    def times():
+        assert run(['top', '--once', '--format', 'json']) == 0
+        return {
+            (each['kind'], each['name']): (each['delivery_p50_ms'], each['delivery_p99_ms'])
+            for each in json.loads(capsys.readouterr()[0])['entities']
+        }
+
+    def are_known():
+        near, kept = (times()['subscription', name] for name in ('near', 'kept'))
+        return None not in near + kept and near[1] >= near[0] > 20 and kept[1] >= kept[0] > 20
+
+    wait_for(are_known, 'the times')
+    assert times()['timer', 'say'] == times()['publisher', 'near'] == (None, None)
