@@ -2,6 +2,7 @@
 
 import os
 import re
+import select
 import signal
 import socket
 import subprocess
@@ -133,12 +134,16 @@ class Child:
             'PYTHONUNBUFFERED': '1',
             'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]),
         }
-        self.lines = []
+        self._lines = []
         # Of other commands nobody waits for that.
         self._up = str(arguments[0]) != 'up'
         self._grown = threading.Condition()
         self._ended = False
+        self._rest = b''
         self._process = start_composer(map(str, arguments), folder, environment)
+        # A read never waits: who looks for lines reads them, too.
+        self._output = self._process.stdout.fileno()
+        os.set_blocking(self._output, False)
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
@@ -149,6 +154,12 @@ class Child:
     @property
     def output(self):
         return '\n'.join(self.lines)
+
+    @property
+    def lines(self):
+        """All that it has printed until now."""
+        self._take_lines()
+        return self._lines
 
     def matching(self, part):
         return [line for line in self.lines if part in line]
@@ -200,14 +211,27 @@ class Child:
         self._process.stdout.close()
 
     def _read(self):
-        while line := read_line(self._process.stdout):
-            with self._grown:
-                self.lines.append(line.rstrip('\n'))
-                self._up = self._up or ' ready in ' in line
-                self._grown.notify_all()
+        printing = select.poll()
+        printing.register(self._output, select.POLLIN)
+        while not self._ended:
+            printing.poll()
+            self._take_lines()
+
+    def _take_lines(self):
         with self._grown:
-            self._ended = True
-            self._grown.notify_all()
+            while not self._ended:
+                try:
+                    chunk = os.read(self._output, 1 << 16)
+                except BlockingIOError:
+                    return
+                self._ended = not chunk
+                *lines, self._rest = (self._rest + (chunk or b'\n' * bool(self._rest))).split(
+                    b'\n'
+                )
+                lines = [line.decode(errors='replace').rstrip('\r') for line in lines]
+                self._lines += [line for line in lines if _OF_OTHERS not in line]
+                self._up = self._up or any(' ready in ' in line for line in lines)
+                self._grown.notify_all()
 
 
 class Composing:

@@ -27,7 +27,7 @@ from composer.executor.sources.waitable_sources import (
 _UNUSED_SEC = 0.25
 _FLUSH_SEC = 1.0
 # Whoever shuts the middleware down before the thread has left it crashes.
-_END_SEC = 5.0
+_END_SEC = 2.0
 _PAUSE_SEC = 0.008
 _MAX_EVENTS_SHARE = 0.02
 # rclpy triggers its guard condition before it shuts the contexts down, in a thread that may be

@@ -21,6 +21,7 @@ from composer.drawing.shapes import arrange, count_kinds, list_outside
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.bindings import node_bindings
+from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource
 
 if TYPE_CHECKING:
@@ -76,7 +77,25 @@ def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence
     if context is None:
         texts = [f'{each.span or each.file}: {each.message}' for each in findings]
         raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
-    return Drawing(build_picture(context, findings), _list_code(context))
+    return Drawing(build_picture(context, findings), _list_code(context), _list_rates(context))
+
+
+def _list_rates(context: CheckContext) -> dict[str, float]:
+    """Return how often timers are called, in Hz, by their ids, but those that may take longer."""
+    return {
+        f'timer:{node.full_name}:{timer.name}': 1 / timer.period_sec
+        for node in context.spec.nodes.values()
+        for timer in node.timers.values()
+        if not timer.by_parameter
+        and (timer.behaviour is None or _find_kind(context, timer.behaviour) is FunctionKind.PLAIN)
+    }
+
+
+def _find_kind(context: CheckContext, behaviour: BehaviourSpec) -> FunctionKind | None:
+    module = context.modules.find(behaviour.module) if behaviour.module else None
+    if not isinstance(module, ModuleSource) or behaviour.function not in module.functions:
+        return None
+    return module.functions[behaviour.function].kind
 
 
 def _list_code(context: CheckContext) -> dict[str, list[Excerpt]]:
@@ -111,12 +130,18 @@ class Drawing:
         nodes: The full names of the nodes.
         topics: Those of the topics.
         topic_of_ends: The topic of each publisher and subscription, by the ids of these.
+        rates: How often timers are called, in Hz, by their ids.
 
     Raises:
         ComposerError: Graphviz is missing or failed.
     """
 
-    def __init__(self, picture: Picture, code: Mapping[str, list[Excerpt]] | None = None) -> None:
+    def __init__(
+        self,
+        picture: Picture,
+        code: Mapping[str, list[Excerpt]] | None = None,
+        rates: Mapping[str, float] | None = None,
+    ) -> None:
         self._picture, self._declared, self._code = picture, picture.channels, code or {}
         self._first = _fold_many(picture)
         # The one that is read with less zooming stays.
@@ -125,6 +150,7 @@ class Drawing:
         self.name = picture.name
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
+        self.rates = rates or {}
         self.topic_of_ends = {edge.id: edge.channel.id for edge in picture.edges}
         self._lock = threading.Lock()
         self._fold = lru_cache(_MOST_FOLDED)(self._describe)

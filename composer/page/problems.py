@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 _ORDER = {'error': 0, 'stale': 1, 'warn': 2, 'warning': 2}
 _MS_PER_SEC = 1000
+# It may begin within the period.
+_FEW_TICKS = 3
 _MOST_ENDS = 50
 _LONGEST_NAME = 200
 # Composer's own tools, as the page itself; and an end may be known before its node is.
@@ -23,14 +25,19 @@ def list_problems(
     health: dict[str, Any],
     outside: Mapping[str, list[dict[str, str]]],
     topics: Mapping[str, str],
+    rates: Mapping[str, float],
 ) -> list[dict[str, str]]:
     """Return problems as the page lists them: `level`, `text` and `node`, which may be empty.
 
     Args:
         outside: See `find_outside`.
         topics: The topic of each publisher and subscription, by its kind, node and name.
+        rates: How often a timer is to be called, in Hz, likewise.
     """
-    found = [*_of_system(status, health, outside), *_of_entities(health, topics)]
+    states = status.get('lifecycles', {}).items()
+    resting = {*status.get('stopped', ()), *(node for node, state in states if state != 'active')}
+    awake = {key: rate for key, rate in rates.items() if key.split(':')[1] not in resting}
+    found = [*_of_system(status, health, outside), *_of_entities(health, topics, awake)]
     return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))
 
 
@@ -61,7 +68,9 @@ def _of_system(
             yield _problem('warn', end['problem'], end['problem_at'])
 
 
-def _of_entities(health: dict[str, Any], topics: Mapping[str, str]) -> Iterator[dict[str, str]]:
+def _of_entities(
+    health: dict[str, Any], topics: Mapping[str, str], rates: Mapping[str, float]
+) -> Iterator[dict[str, str]]:
     rows = health.get('entities', ())
     publishers = [row for row in rows if row['kind'] == 'publisher' and row['rate_hz']]
     for row in rows:
@@ -70,6 +79,9 @@ def _of_entities(health: dict[str, Any], topics: Mapping[str, str]) -> Iterator[
         drops = f'{row["dropped"]:g} messages dropped' if row['dropped'] else ''
         text = f'{row["errors"]:g} errors since the start' if row['errors'] else drops
         text = row.get('message', level) if level != 'ok' else text
+        rate_hz = rates.get(_key(row), 0.0)
+        if not text and row['rate_hz'] == 0 and rate_hz * health['period_sec'] >= _FEW_TICKS:
+            text = f'0/s, where {rate_hz:.3g}/s are declared'
         if drops and (topic := topics.get(_key(row))):
             sent = [each for each in publishers if topics.get(_key(each)) == topic]
             text += ''.join(f'; {each["node"]} publishes {each["rate_hz"]:.3g}/s' for each in sent)

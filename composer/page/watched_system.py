@@ -152,7 +152,8 @@ class WatchedSystem:
                 found = self._read_health(health)
                 next_health = begun + found['period_sec']
                 self._note_heard(said, found)
-            topics = self.drawing.topic_of_ends if self.drawing else {}
+            drawn = self.drawing
+            known = (drawn.topic_of_ends, drawn.rates) if drawn else ({}, {})
             self.state = self.state | {
                 'name': said['name'],
                 'runs': True,
@@ -160,7 +161,7 @@ class WatchedSystem:
                 'status': said,
                 'health': found,
                 'outside': self._outside,
-                'problems': list_problems(said, found, self._outside, topics),
+                'problems': list_problems(said, found, self._outside, *known),
                 'next': self._saved and self._saved.next_plan,
             }
             # A silent worker takes a second of the pause: the others do not seem old for it.

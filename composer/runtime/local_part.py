@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from composer.runtime.rewiring.reading import Reading
     from composer.runtime.tracing.tracer import TracePart
 
-_EXECUTOR_STOP_SEC = 3.0
+_EXECUTOR_STOP_SEC = 2.0
 # How long a worker that is started again waits for the clients of others, of which some may go.
 _LONGEST_DISCOVERY_SEC = 10.0
 _POLL_SEC = 0.01

@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import textwrap
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,7 @@ pytest.importorskip('uvicorn')
 from composer.application.running_systems.health import read_health
 from composer.cli.main import run
 from composer.page import watched_system
+from composer.page.drawn_parts import draw_files
 from composer.page.looks import Recording
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
@@ -349,8 +351,49 @@ def test_drops_are_told_with_who_publishes_too_fast(figures, text):
         entity('subscription', '/b', **figures),
     ]
     topics = {f'{row["kind"]}:{row["node"]}:scan': row['node'] != '/other' for row in rows}
-    (problem,) = list_problems({}, {'entities': rows}, {}, topics)
+    (problem,) = list_problems({}, {'entities': rows}, {}, topics, {})
     assert problem == {'level': 'warn', 'text': f'subscription scan of /b: {text}', 'node': '/b'}
+
+
+@pytest.mark.parametrize(
+    ('rate_hz', 'status', 'is_told'),
+    [
+        (0.0, {}, True),
+        (0.5, {}, False),
+        (None, {}, False),
+        (0.0, {'stopped': ['/a']}, False),
+        (0.0, {'lifecycles': {'/a': 'active'}}, True),
+        (0.0, {'lifecycles': {'/a': 'inactive'}}, False),
+    ],
+)
+def test_a_timer_that_is_never_called_is_told(rate_hz, status, is_told):
+    rows = [entity('timer', node, rate_hz=rate_hz) for node in ('/a', '/seldom')]
+    rates = {'timer:/a:scan': 10.0, 'timer:/seldom:scan': 1.0}
+    health = {'entities': rows, 'period_sec': 1.0}
+    told = [each['text'] for each in list_problems(status, health, {}, {}, rates)]
+    assert ('timer scan of /a: 0/s, where 10/s are declared' in told) is is_told
+    assert not any('/seldom' in each for each in told)
+
+
+def test_what_timers_are_to_do_is_read_from_the_file(tmp_path):
+    text = """
+        version: 1
+        nodes:
+          n:
+            parameters: {hz: 5.0}
+            publishers: {out: std_msgs/msg/String}
+            timers:
+              fixed: {rate: 4, publish: out, message: hello}
+              plain: {period: 0.5, behaviour: 'parts:plain'}
+              later: {period: 0.5, behaviour: 'parts:later'}
+              steps: {period: 0.5, behaviour: 'parts:steps'}
+              by: {rate: {parameter: hz}, behaviour: 'parts:plain'}
+    """
+    code = 'def plain(node):\n    pass\n\nasync def later(node):\n    pass\n\ndef steps(node):\n    yield\n'
+    (tmp_path / 'system.yaml').write_text(textwrap.dedent(text))
+    (tmp_path / 'parts.py').write_text(code)
+    drawing = draw_files([tmp_path / 'system.yaml'], [], [])
+    assert drawing.rates == {'timer:/n:fixed': 4.0, 'timer:/n:plain': 2.0}
 
 
 def test_a_stream_tells_of_changes_and_bears_who_leaves(page):

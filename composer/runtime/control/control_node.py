@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 # The node is created then even if the system is not up.
 _LATEST_SEC = 0.5
-_STOP_SEC = 3.0
+_STOP_SEC = 2.0
 # How long an answer may take to whoever asked, before the node goes.
 _ANSWER_SEC = 0.1
 _REFUSAL = "the nodes of a system are those of its file: edit it, then 'composer reload {}'"
