@@ -36,10 +36,10 @@ class QueueObserver(Protocol):
     """Is told what comes to a subscription, and what is taken.
 
     Attributes:
-        times_deliveries: Whether it is told how long messages were on their way.
+        timings: Of how many messages it is to be told how long they were on their way.
     """
 
-    times_deliveries: bool
+    timings: int
 
     def on_announced(self, count: int | None) -> None:
         """Note that `count` messages came; None: nobody knows how many."""
@@ -219,17 +219,15 @@ class SubscriptionSource(EventSource):
                 taken = [local.popleft()]
             except IndexError:
                 return NOTHING  # Another thread took it.
-            if self.observer is not None and self.observer.times_deliveries:
-                self._note_local_delivery(id(taken[0]))
+            if self.inbox is not None and self.inbox.put_ns:
+                self._note_local_delivery(self.inbox.put_ns.pop(id(taken[0]), None))
             result = callback(taken.pop())
             return result if result is not None and self._is_async(callback) else None
         return self._run_taken()
 
-    def _note_local_delivery(self, message: int) -> None:
-        put_ns = None if self.inbox is None else self.inbox.put_ns
-        begun_ns = None if put_ns is None else put_ns.pop(message, None)
-        if begun_ns is not None:
-            self.observer.note_delivery(monotonic_ns() - begun_ns)
+    def _note_local_delivery(self, put_ns: int | None) -> None:
+        if self.observer is not None and put_ns is not None:
+            self.observer.note_delivery(monotonic_ns() - put_ns)
 
     def _limit_local(self) -> None:
         """Push out what one queue would not hold beside what the middleware has."""
@@ -260,7 +258,8 @@ class SubscriptionSource(EventSource):
                 observer.note_nothing_taken(arrived)
             self._note_nothing_taken(revision)
             return NOTHING
-        if observer is not None and observer.times_deliveries:
+        if observer is not None and observer.timings:
+            observer.timings -= 1
             observer.note_delivery(max(0, time_ns() - taken[1]['source_timestamp']))
         event_fd = self.event_fd
         if event_fd is not None and event_fd.is_shared:

@@ -8,8 +8,6 @@ from contextlib import suppress
 from time import monotonic_ns
 from typing import Any
 
-_MOST_TIMES = 10_000
-
 
 class Inbox:
     """The queue of an entity for what does not come through the middleware.
@@ -24,17 +22,28 @@ class Inbox:
         messages: The oldest first.
         source: The `EventSource` that takes them, while an executor listens to the entity.
         overruns: How many were pushed out.
-        put_ns: When those that wait were put here, by their `id`; `None` if nobody asks.
+        timings: How many of the next messages are timed.
+        put_ns: When those of these that wait were put here, by their `id`.
     """
 
-    __slots__ = ('_heir', '_passing_on', 'depth', 'messages', 'overruns', 'put_ns', 'source')
+    __slots__ = (
+        '_heir',
+        '_passing_on',
+        'depth',
+        'messages',
+        'overruns',
+        'put_ns',
+        'source',
+        'timings',
+    )
 
     def __init__(self, depth: int | None) -> None:
         self.depth = depth
         self.messages: deque[Any] = deque(maxlen=depth)
         self.source: Any = None
         self.overruns = 0
-        self.put_ns: dict[int, int] | None = None
+        self.timings = 0
+        self.put_ns: dict[int, int] = {}
         self._heir: Inbox | None = None
         self._passing_on = threading.RLock()
 
@@ -43,20 +52,15 @@ class Inbox:
         messages = self.messages
         if len(messages) == self.depth:
             self.overruns += 1
-        if self.put_ns is not None:
-            self._note_time(self.put_ns, message)
+        if self.timings:
+            self.timings -= 1
+            self.put_ns[id(message)] = monotonic_ns()
         messages.append(message)
         if self._heir is not None:
             self.pass_on(self._heir)
         source = self.source
         if source is not None:
             source.parts.scheduler.add_events(source, 0)
-
-    def _note_time(self, put_ns: dict[int, int], message: Any) -> None:
-        if len(put_ns) > _MOST_TIMES:
-            # Those that were pushed out are not taken.
-            put_ns.clear()
-        put_ns[id(message)] = monotonic_ns()
 
     def pass_on(self, heir: Inbox) -> None:
         """Move what waits to the end of another queue, and all that is still put here."""

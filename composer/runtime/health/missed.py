@@ -15,6 +15,8 @@ from composer.runtime.tracing.tracer import tracer
 
 _LATE_SHARE = 0.1
 _MIN_LATE_NS = 1_000_000
+# To time a message costs as much as a tenth of its delivery.
+_TIMINGS, _MOST_TIMED = 25, 1000
 
 
 @record
@@ -139,21 +141,27 @@ class QueueOverruns(MissedNothing):
         self._taken = 0
         self._overruns = 0
         self._is_counting = True
-        self.times_deliveries = False
+        self.timings = 0
         self.deliveries = deliveries = CallTimes(has_cpu=False)
         self.note_delivery = deliveries.add
 
     def __call__(self) -> MissedCounts:
         """Return what it has missed."""
-        if self.times_deliveries != call_meter.is_on:
-            self.times_deliveries = call_meter.is_on
-            if self._inbox is not None:
-                self._inbox.put_ns = {} if self.times_deliveries else None
+        self._begin_timings()
         if self._depth:
             # A queue that never runs empty: the middleware holds no more than its depth.
             self._note_overruns(self._arrived - self._taken - self._depth)
         local = 0 if self._inbox is None else self._inbox.overruns
         return MissedCounts(overruns=self._overruns + local)
+
+    def _begin_timings(self) -> None:
+        """Have some messages of the next period timed, if somebody looks."""
+        self.timings = _TIMINGS if call_meter.is_on else 0
+        if self._inbox is not None:
+            self._inbox.timings = self.timings
+            # Those that were pushed out are never taken.
+            if len(self._inbox.put_ns) > _MOST_TIMED:
+                self._inbox.put_ns.clear()
 
     def queued(self) -> int:
         """Return how many messages wait to be taken, as far as that is known."""
