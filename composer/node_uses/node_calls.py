@@ -19,7 +19,7 @@ from composer.node_uses.reading import (
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.modules import read_signature
-from composer.python_source.syntax import is_none
+from composer.python_source.syntax import is_none, own_nodes
 from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
@@ -146,14 +146,24 @@ def _note_created(
         text = only_text(run.names.value_of(channel, scope))
         name = only_text(run.names.value_of(arguments.get('name', channel), scope))
         run.reading.created.append(CreatedEntity(noun, name, text, type_name, place))
-    if 'publish' in arguments:
-        run.use('publisher', run.names.value_of(arguments['publish'], scope))
     behaviour = arguments.get('behaviour')
     function = run.names.value_of(behaviour, scope) if behaviour is not None else None
+    if 'publish' in arguments:
+        named = run.names.value_of(arguments['publish'], scope)
+        run.use('publisher', named)
+        if isinstance(function, Function) and (name := only_text(named)):
+            run.reading.payloads += _list_results(function, name, is_certain=run.is_certain)
     if isinstance(function, Function):
         yield function, given
     elif behaviour is not None:
         run.escape(Chain(('node',)))
+
+
+def _list_results(function: Function, publisher: str, *, is_certain: bool) -> Iterator[Payload]:
+    """Yield what a function gives away that a publisher publishes."""
+    for node in own_nodes(function.definition):
+        if isinstance(node, ast.Return | ast.Yield) and node.value and not is_none(node.value):
+            yield Payload('publishers', publisher, '', node.value, function.module, is_certain)
 
 
 def _check_options(run: Run, noun: str, arguments: Mapping[str, ast.expr], scope: Scope) -> None:

@@ -164,6 +164,7 @@ WRONG = {
     "node.publish('cover', {'pose': {'covariance': [0.0] * 6}})": 'field-length',
     "node.publish('level', 'x' if m.pose else 1)": 'field-type',
     "node.publish('scan', {'ranges': 1.0})": 'field-type',
+    "def give(node): return {'lat': 1.0}\nnode.create_timer(1.0, give, publish='command')": 'unknown-field',
     # payloads that are computed
     'for each in Path(poses=[]).poses: each.pose.x = 1.0': 'unknown-field',
     'Keeper(node).wait()': 'missing-await',
@@ -236,6 +237,8 @@ RIGHT = [
     'i = iter([1, 2]); next(i); print(next(i), list(i), i.__next__)',
     "print((5).real, (5.5).is_integer(), (5).to_bytes(2, 'big').hex(), 'a'.encode().decode().upper())",
     "t = Twist(); t.linear = {'x': 1.0}; node.publish('command', t)",
+    "def give(node): return {'lat': 1.0}\nnode.create_timer(1.0, give, publish=node.parameters.mode)",
+    "def give(node): return None if m.pose else 5\nnode.create_timer(1.0, give, publish='level')",
 ]
 
 
