@@ -183,7 +183,8 @@ class ComposerExecutor(MultiThreadedExecutor):
 
     def wake(self) -> None:
         """Look again at the entities, their groups, the context and what is waited for."""
-        if self.is_forked:
+        # The context may be shut down while the executor is made.
+        if self._is_ended or self.is_forked:
             return
         self._spinner.registry.is_stale = True
         self._spinner.scheduler.retry_deferred()

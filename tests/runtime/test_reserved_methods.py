@@ -59,7 +59,9 @@ def destroy_for_sure(node):
 def shutdown_for_sure(node):
     from rclpy.context import Context
 
-    Context.shutdown(node.ros.context)
+    # It may be called again before the system ends.
+    if node.ros.context.ok():
+        Context.shutdown(node.ros.context)
 
 def live(node):
     node.logger.info('alive')
