@@ -271,7 +271,7 @@ def test_what_calls_cost_is_measured_while_somebody_looks(compose, look_until, c
     assert run(['top', '--once', '--format=json', '--by=node', '--sort=entity']) == 0
     by_node = json.loads(capsys.readouterr()[0])
     assert [row['node'] for row in by_node['nodes']] == ['/arm', '/robot/ear']
-    assert by_node['nodes'][0]['cpu'] >= 0.05
+    assert by_node['nodes'][0]['cpu'] > 0.0
     assert 'entities' not in by_node
 
 
