@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,15 @@ _ANSWER_SEC = 3.0
 _RELOAD_SEC = 60.0
 _MOST = 500
 _LONGEST_VALUE = 10_000
+# The bytes of a pixel, and which of them are red, green and blue.
+_ENCODINGS = {
+    'rgb8': (3, [0, 1, 2]),
+    'bgr8': (3, [2, 1, 0]),
+    'rgba8': (4, [0, 1, 2]),
+    'bgra8': (4, [2, 1, 0]),
+    'mono8': (1, [0, 0, 0]),
+}
+_MOST_PIXELS = 144
 
 
 def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
@@ -55,7 +65,7 @@ def list_parameters(client: Client, node: str) -> list[dict[str, Any]]:
 
 
 def look_at_message(client: Client, topic: str) -> dict[str, Any]:
-    """Return a message of a topic as `text`, in YAML.
+    """Return a message of a topic as `text`, in YAML, and the `image` that it may be.
 
     Raises:
         ComposerError: None came, or its type is not installed.
@@ -70,7 +80,28 @@ def look_at_message(client: Client, topic: str) -> dict[str, Any]:
             raise ComposerError(message)
     finally:
         client.node.destroy_subscription(ros)
-    return {'text': _render(messages[0])}
+    return {'text': _render(messages[0]), 'image': show_small(messages[0])}
+
+
+def show_small(message: Any) -> dict[str, Any] | None:
+    """Return `width`, `height` and `rgb`, in base64, of an image, of at most 144 by 144 pixels.
+
+    Returns:
+        `None` if it is none, or has another encoding or less data than it says.
+    """
+    if interface_name(type(message)) != 'sensor_msgs/msg/Image':
+        return None
+    import numpy as np
+
+    size, colours = _ENCODINGS.get(message.encoding, (0, []))
+    height, width, step = message.height, message.width, message.step
+    if not (size and height and width) or step < width * size or len(message.data) < height * step:
+        return None
+    rows = np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)
+    every = -(-max(width, height) // _MOST_PIXELS)
+    pixels = rows[::every, : width * size].reshape(-1, width, size)[:, ::every, colours]
+    data = base64.b64encode(pixels.tobytes()).decode()
+    return {'width': pixels.shape[1], 'height': pixels.shape[0], 'rgb': data}
 
 
 def show_template(client: Client, kind: str, name: str) -> dict[str, Any]:

@@ -860,7 +860,7 @@ function offerMessage() {
   const before = section.about;
   const part = parts.get(chosen);
   if (begin(section) === before || part?.kind !== 'topic') return;
-  const [about, text] = [make('p', '', 'kind'), make('pre')];
+  const [about, image, text] = [make('p', '', 'kind'), make('canvas'), make('pre')];
   let looks = false;
   const look = async () => {
     if (!looks || !button.isConnected) return;
@@ -869,7 +869,9 @@ function offerMessage() {
     if (!looks) return;
     about.textContent = `as of ${clock()}`;
     text.textContent = clean(found.text ?? found.problem);
-    if (!text.isConnected) section.append(about, text);
+    image.hidden = !found.image;
+    if (found.image) paintImage(image, found.image);
+    if (!text.isConnected) section.append(about, image, text);
     // Of a slow topic, one at a time: the page waits for it.
     if (found.problem || Date.now() - begun > SAMPLE_MS) button.click();
     else setTimeout(look, SAMPLE_MS);
@@ -880,6 +882,17 @@ function offerMessage() {
     look();
   });
   section.append(make('h2', 'Message'), button);
+}
+
+function paintImage(canvas, {width, height, rgb}) {
+  Object.assign(canvas, {width, height});
+  const bytes = atob(rgb);
+  const picture = new ImageData(width, height);
+  for (let index = 0; index < width * height; index++) {
+    for (let part = 0; part < 3; part++) picture.data[4 * index + part] = bytes.charCodeAt(3 * index + part);
+    picture.data[4 * index + 3] = 255;
+  }
+  canvas.getContext('2d').putImageData(picture, 0, 0);
 }
 
 // The log: all of it, or that of the chosen node.

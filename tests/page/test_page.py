@@ -1,5 +1,6 @@
 """The page of a running system: what it shows, in a real browser, and what it refuses."""
 
+import base64
 import http.client
 import json
 import os
@@ -24,7 +25,7 @@ from composer.application.running_systems.health import read_health
 from composer.cli.main import run
 from composer.page import watched_system
 from composer.page.drawn_parts import draw_files
-from composer.page.looks import Recording
+from composer.page.looks import Recording, show_small
 from composer.page.problems import list_problems
 from composer.page.watched_system import WatchedSystem
 from tests.running import DEADLINE_SEC, wait_for
@@ -396,6 +397,33 @@ def test_what_timers_are_to_do_is_read_from_the_file(tmp_path):
     assert drawing.rates == {'timer:/n:fixed': 4.0, 'timer:/n:plain': 2.0}
 
 
+@pytest.mark.parametrize(
+    ('wrong', 'is_shown'),
+    [
+        ({}, True),
+        ({'encoding': 'mono8'}, True),
+        ({'encoding': '32FC1'}, False),
+        ({'height': 2**32 - 1}, False),
+        ({'width': 2**32 - 1, 'step': 2**32 - 1}, False),
+        ({'step': 11}, False),
+        ({'height': 0}, False),
+        ({'width': 0}, False),
+        ({'data': []}, False),
+    ],
+    ids=str,
+)
+def test_only_images_with_all_their_data_are_shown_small(wrong, is_shown):
+    from sensor_msgs.msg import Image
+
+    right = {'encoding': 'rgba8', 'width': 3, 'height': 2, 'step': 13, 'data': [1, 2, 3, 4] * 7}
+    small = show_small(Image(**right | wrong))
+    assert (small is not None) is is_shown
+    if not wrong:
+        pixels = base64.b64decode(small['rgb'])
+        assert pixels[:3] == b'\1\2\3'
+        assert len(pixels) == 3 * small['width'] * small['height'] == 18
+
+
 def test_a_stream_tells_of_changes_and_bears_who_leaves(page):
     for _ in range(12):
         with page.stream() as states:
@@ -635,6 +663,23 @@ SCRIPTS = [
 CONTROLS = [0x1B, 0x08, 0x0D, 0x7F, 0x9B, 0x200B, 0x200F, 0x202E, 0x2028, 0x2066, 0xFEFF]
 
 
+def look_at_picture(peer, browser, port):
+    """Publish a red image, and see that it is red on the page."""
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from sensor_msgs.msg import Image
+
+    picture = Image(encoding='bgr8', width=400, height=200, step=1200, data=[0, 0, 255] * 80_000)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    publisher = peer.advertise(Image, '/picture', latched)
+    publisher.publish(picture)
+    browser.get(f'http://127.0.0.1:{port}/#topic%3A%2Fpicture')
+    click(browser, '#message button')
+    pixel = """const [canvas] = document.getElementsByTagName('canvas');
+        return canvas && !canvas.hidden && [canvas.width, canvas.height,
+            ...canvas.getContext('2d').getImageData(9, 9, 1, 1).data]"""
+    wait_for(lambda: browser.execute_script(pixel) == [134, 67, 255, 0, 0, 255], 'the picture')
+
+
 def test_hostile_texts_stay_text(compose, browser, peer):
     """Payloads, log lines and names, values of parameters and errors of calls: 36 and more."""
     from rcl_interfaces.msg import Log
@@ -652,8 +697,13 @@ def test_hostile_texts_stay_text(compose, browser, peer):
             parameters: {texts: {default: ['']}, long: {default: ''}}
             subscriptions:
               names: {topic: /names, type: sensor_msgs/msg/JointState, behaviour: 'parts:hear', external: true}
+              picture: {topic: /picture, type: sensor_msgs/msg/Image, behaviour: 'parts:see', external: true}
     """
-    child = compose(system, 'def hear(node, message):\n    raise ValueError(message.name[0])')
+    code = (
+        'def hear(node, message):\n    raise ValueError(message.name[0])\n\n\n'
+        'def see(node, message):\n    pass\n'
+    )
+    child = compose(system, code)
     child.wait_until_ready()
     page = Page(compose.domain_id, 'system', '--allow-changes')
     find, text_of = partial(find_all, browser), partial(read_text, browser)
@@ -690,6 +740,7 @@ def test_hostile_texts_stay_text(compose, browser, peer):
     values = 'return document.querySelector("#parameters input")?.value ?? ""'
     wait_for(lambda: SCRIPTS[0] in browser.execute_script(values), 'parameters')
     assert 'xxx…' in contents('#parameters dd')
+    look_at_picture(peer, browser, page.port)
     assert len(json.dumps(page.json('/api/state'))) < 100_000
     assert browser.execute_script('return window.hit') is None
     assert not find('img, iframe, style, body script:not([src])')
