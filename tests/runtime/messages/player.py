@@ -162,7 +162,7 @@ class _Game:
         wait_for(is_idle, 'callbacks to end')
 
     def _count_heard(self):
-        return sum(map(len, self.outcome.heard.values()))
+        return sum(map(len, list(self.outcome.heard.values())))
 
     def _is_empty(self):
         return not any(
