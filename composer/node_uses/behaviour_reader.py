@@ -192,18 +192,19 @@ class _Results:
             if isinstance(init, Function):
                 self.walk.enter(init, {**dict(bound.given)}, is_waited=True, is_call=False)
         is_generator = self.kind is not None and self.kind.is_generator
+        is_returned = self.function.is_returned
         for node in own_nodes(definition):
             match node:
-                case ast.Return(value=ast.expr() as value):
+                case ast.Return(value=ast.expr() as value) if is_returned:
                     self._note_payload(value, 'returned')
                     self._check_answer(value)
-                case ast.Yield(value=ast.expr() as value) if is_generator:
+                case ast.Yield(value=ast.expr() as value) if is_generator and is_returned:
                     self._note_payload(value, 'yielded')
                 case ast.While(test=test) if self._is_endless(node):
                     run, module = self.walk.run, self.function.module
                     run.report('endless-loop', module, test, _ENDLESS, _BY_TIMER)
         is_last = self.kind is FunctionKind.ASYNC_GENERATOR
-        is_allowed = self.binding.may_yield or not is_generator
+        is_allowed = is_returned and (self.binding.may_yield or not is_generator)
         # The last one that an asynchronous generator yields is the result.
         if self.wire.needs_payload and is_allowed and not is_last:
             self._check_ways(definition)

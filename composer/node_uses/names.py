@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import builtins
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, reduce
 from itertools import takewhile
 from typing import TYPE_CHECKING, TypeAlias, TypeGuard
@@ -20,10 +20,12 @@ from composer.python_source.syntax import (
     FunctionNode,
     bound_names,
     imported_names,
+    inner_of,
     is_none,
     list_arguments,
     own_nodes,
     positional_names,
+    wrapper_of,
 )
 from composer.records import record
 
@@ -60,12 +62,19 @@ class Texts:
 
 @record
 class Function:
-    """A function of the project; a method has its first argument already."""
+    """A function of the project; a method has its first argument already.
+
+    Attributes:
+        makers: The modules of its decorators, which call it with all that they are given.
+        is_returned: Whether these return what it returns.
+    """
 
     module: ModuleSource
     definition: FunctionNode | ast.Lambda
     bound: Value | None = None
     scope: Scope | None = None
+    makers: tuple[ModuleSource, ...] = ()
+    is_returned: bool = True
 
     @property
     def parameters(self) -> list[str]:
@@ -152,6 +161,7 @@ _MADE = frozenset(
         *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
     }
 )
+_WRAPS = External('functools.wraps')
 _INSTALLED = {'site-packages', 'dist-packages'}
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
 Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
@@ -291,7 +301,7 @@ class Names:
     def _top_value(self, module: ModuleSource, statement: ast.AST, name: str) -> Value | None:
         match statement:
             case ast.FunctionDef() | ast.AsyncFunctionDef():
-                return None if statement.decorator_list else Function(module, statement)
+                return self._decorated(Function(module, statement), statement.decorator_list)
             case ast.ClassDef():
                 return Class(module, statement)
             case ast.Import() | ast.ImportFrom():
@@ -301,6 +311,33 @@ class Names:
             if isinstance(target, ast.Name) and target.id == name and not is_item:
                 return None if is_changed else self.value_of(value, Scope(module))
         return None
+
+    def _decorated(self, function: Function, decorators: list[ast.expr]) -> Function | None:
+        """Return a function, if decorators of the project call it with all they are given."""
+        for decorator in decorators:
+            made_by = decorator.func if isinstance(decorator, ast.Call) else decorator
+            maker = self.value_of(made_by, Scope(function.module))
+            if not isinstance(maker, Function) or maker.bound or maker.makers:
+                return None
+            around = maker.definition if made_by is decorator else inner_of(maker.definition)
+            wrapper, mark, is_returned = wrapper_of(around) or (None, made_by, False)
+            if wrapper is None or self.value_of(mark, Scope(maker.module)) != _WRAPS:
+                return None
+            # Other code that calls it gets a coroutine, or a generator, all the same.
+            if not is_returned and self.kind_of(wrapper) is not self.kind_of(function.definition):
+                return None
+            is_returned &= function.is_returned
+            makers = (*function.makers, maker.module)
+            function = replace(function, makers=makers, is_returned=is_returned)
+        return function
+
+    def _method(self, of: Class, method: FunctionNode, bound: Instance | None) -> Function | None:
+        match [ast.unparse(each) for each in method.decorator_list]:
+            case ['staticmethod']:
+                return Function(of.module, method)
+            case ['classmethod']:
+                return Function(of.module, method, of)
+        return self._decorated(Function(of.module, method, bound), method.decorator_list)
 
     def full_name(self, module: ModuleSource, statement: ast.AST, name: str) -> str:
         """Return the full name of what an import stores under a name; empty if unknown."""
@@ -343,7 +380,7 @@ class Names:
             if name in members.methods:
                 # A class may replace it: `get = classmethod(get)`.
                 method = members.methods[name]
-                return _method(each, method, instance) if value is None else None
+                return self._method(each, method, instance) if value is None else None
             if value is not None and not self._is_stored(each.module, name):
                 return self.value_of(value, Scope(each.module))
             stored = members.stored.get(name, [])
@@ -481,15 +518,6 @@ class _Members:
                     case ast.Attribute(value=ast.Name(id=owner), attr=name):
                         if owner == own_name and not is_none(value):
                             self.stored.setdefault(name, []).append((method, value))
-
-
-def _method(of: Class, method: FunctionNode, instance: Instance | None) -> Function | None:
-    decorators = [ast.unparse(each) for each in method.decorator_list]
-    if decorators == ['staticmethod']:
-        return Function(of.module, method)
-    if decorators == ['classmethod']:
-        return Function(of.module, method, of)
-    return None if decorators else Function(of.module, method, instance)
 
 
 def _either(one: Value | None, other: Value | None) -> Value | None:

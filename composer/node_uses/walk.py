@@ -159,7 +159,7 @@ class Walk:
     ) -> None:
         """Walk through a function that Composer calls, or this code."""
         definition, run = function.definition, self.run
-        run.reading.passed.append(Passed(definition, passed, is_call))
+        run.reading.passed.append(Passed(definition, passed, is_call or not function.is_returned))
         given = {name: value for name, value in passed.items() if value is not None}
         arguments = [each.arg for each in list_arguments(definition.args)]
         if function.bound is not None and arguments:
@@ -180,7 +180,7 @@ class Walk:
             return
         self.followed.add(id(definition))
         scope = Scope(function.module, definition, given, function.scope, waits=is_waited)
-        run.reading.modules.setdefault(id(function.module), function.module)
+        run.reading.modules |= {id(each): each for each in (function.module, *function.makers)}
         before = run.standing
         self._under_way.append(scope)
         if isinstance(definition, ast.Lambda):

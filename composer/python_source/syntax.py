@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from itertools import islice
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -24,6 +25,8 @@ _MOST_CODE_OBJECTS = 4000
 # It copies each `finally` for each way out of its `try`: nested ones make gigabytes of a line.
 _MOST_COMPILED_NODES = 300_000
 _WAYS_OUT = (ast.Return, ast.Break, ast.Continue)
+# What a decorator may ask of a function, and of a node.
+_LOGGED = frozenset({'__name__', '__qualname__', 'logger'})
 SCOPES = (*FUNCTIONS, ast.ClassDef, ast.Lambda)
 
 
@@ -123,6 +126,52 @@ def list_arguments(arguments: ast.arguments) -> list[ast.arg]:
 def positional_names(definition: FunctionNode | ast.Lambda) -> list[str]:
     """Return the names of the parameters that are given by their positions."""
     return [each.arg for each in (*definition.args.posonlyargs, *definition.args.args)]
+
+
+def inner_of(definition: ast.AST | None) -> FunctionNode | None:
+    """Return the function that another one defines last, and returns."""
+    match definition:
+        case ast.FunctionDef(body=[*_, inner, ast.Return(value=ast.Name(id=name))]):
+            return inner if isinstance(inner, FUNCTIONS) and inner.name == name else None
+    return None
+
+
+def wrapper_of(maker: ast.AST | None) -> tuple[FunctionNode, ast.expr, bool] | None:
+    """Return the wrapper that a decorator makes, which calls a function with all it is given.
+
+    With it come what marks it, as `functools.wraps`, and whether it returns what the function
+    does. `None` if more than logging may happen to these, or if it may drop an error.
+    """
+    wrapper = inner_of(maker)
+    if wrapper is None or not isinstance(maker, ast.FunctionDef) or maker.decorator_list:
+        return None
+    match list_arguments(maker.args), wrapper.decorator_list:
+        case [ast.arg(arg=name)], [ast.Call(func=mark, args=[ast.Name(id=same)])] if name == same:
+            nodes, own = list_nodes([maker]), [*own_nodes(wrapper)]
+        case _:
+            return None
+    stars = {id(wrapper.args.vararg): '*', id(wrapper.args.kwarg): '**'}
+    given = {arg.arg: stars.get(id(arg), '') for arg in list_arguments(wrapper.args)}
+    text = f'{name}({", ".join(star + argument for argument, star in given.items())})'
+    calls = [node for node in own if isinstance(node, ast.Call) and ast.unparse(node) == text]
+    logged = [node for node in nodes if isinstance(node, ast.Attribute) and node.attr in _LOGGED]
+    known = {id(part) for part in list_nodes(calls)} | {id(node.value) for node in logged}
+    used = [node for node in nodes if id(node) not in known]
+    left = Counter(key for node in used for key in bound_names(node) or [getattr(node, 'id', '')])
+    # Each is left as a parameter, and the function as the argument of `functools.wraps`.
+    is_plain = calls and all(left[each] == 1 + (each == name) for each in (name, *given))
+    if not is_plain or wrapper.args.defaults or wrapper.args.kwonlyargs or any(map(_catches, own)):
+        return None
+    returned = [node.value for node in own if isinstance(node, ast.Return)]
+    returned += [node.value for node in returned if isinstance(node, ast.Await)]
+    return wrapper, mark, all(call in returned for call in calls)
+
+
+def _catches(node: ast.AST) -> bool:
+    # A `return` in a `finally` drops the error.
+    drops = any(isinstance(part, _WAYS_OUT) for part in list_nodes(getattr(node, 'finalbody', ())))
+    raises = any(isinstance(part, ast.Raise) for part in ast.walk(node))
+    return drops or (isinstance(node, ast.ExceptHandler | ast.With | ast.AsyncWith) and not raises)
 
 
 def is_none(expression: ast.expr | None) -> bool:

@@ -86,16 +86,18 @@ def find_received_values(
         for name, module in modules.items()
         for owner, body in _scopes(module)
         for function in body
-        if isinstance(function, FUNCTIONS) and not function.decorator_list
+        if isinstance(function, FUNCTIONS)
     }
     by_definition = {id(use.definition): use for use in functions.values()}
     for node in all_nodes(context):
         for binding in node_bindings(node):
             behaviour, wire = binding.behaviour, context.behaviours.wire_of(node, binding)
             bound = functions.get((behaviour.module, behaviour.function))
-            if bound is not None:
+            reading = context.behaviours.read(node, binding)
+            # What decorators from elsewhere make of a function, nobody knows.
+            if bound is not None and (reading.passed or not bound.definition.decorator_list):
                 bound.bindings.append((binding, wire))
-            for passed in context.behaviours.read(node, binding).passed:
+            for passed in reading.passed:
                 use = by_definition.get(id(passed.definition))
                 if use is not None:
                     use.is_called |= passed.is_call
