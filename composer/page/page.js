@@ -682,7 +682,7 @@ function showLive() {
   const outside = part?.kind === 'topic' ? listOutside(part.id.slice(6)) : [];
   if (!found.length) { live.replaceChildren(...outside); return; }
   const table = make('table');
-  const titles = ['Hz', '', 'p50 ms', 'p99', 'core %', 'queue', 'drops', 'late', 'errors'];
+  const titles = ['Hz', '', 'p50', 'p99', 'core %', 'queue', 'drops', 'late', 'errors'];
   const header = make('tr');
   for (const title of titles) header.append(make('th', title));
   table.append(header);
@@ -710,7 +710,7 @@ function showLive() {
     for (const each of [name, line]) stamp(each, row.heard, period);
     table.append(about, line);
   }
-  live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now'), table, ...outside);
+  live.replaceChildren(make('h2', isSum ? 'Now, across the border' : 'Now, p50 and p99 in ms'), table, ...outside);
 }
 
 // Adds up the figures of entities.
