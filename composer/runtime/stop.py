@@ -48,7 +48,8 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     Returns:
         Whether all behaviours ended in time; the stacks of those that did not are logged.
     """
-    deadline = monotonic() + timeout_sec
+    begun = monotonic()
+    deadline = begun + timeout_sec
     for node in nodes:
         node.behaviour_node.stopping.set()
         node.gate.is_open = False
@@ -56,6 +57,9 @@ def stop_nodes(nodes: list[LiveNode], timeout_sec: float) -> bool:
     stops = [_NodeStop(node, timeout_sec) for node in reversed(nodes) if _has_work_left(node)]
     for stop in stops:
         stop.wait(deadline)
+    for node in nodes:
+        # What runs may wait for an answer.
+        node.running.wait_until_idle(max(begun + timeout_sec / 2 - monotonic(), 0.0))
     for node in nodes:
         node.gate.close()
     ended = [_wait_until_idle(node, deadline) for node in nodes]

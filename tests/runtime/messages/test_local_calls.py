@@ -65,6 +65,7 @@ def hold(node, request):
     held.append(request.int32_value)
     began.set()
     goes_on.wait(30)
+    time.sleep(0.1)  # Of more answers than its queue holds, the first would be lost.
     return {'int32_value': request.int32_value}
 
 def failure(call):
@@ -184,7 +185,7 @@ def render(local):
         'hold': 'BasicTypes',
     }
     clients = '\n'.join(
-        f'              {name}: {{type: test_msgs/srv/{kind}, qos: 3}}'
+        f'              {name}: {{type: test_msgs/srv/{kind}, qos: 8}}'
         for name, kind in services.items()
     )
     served = '\n'.join(
