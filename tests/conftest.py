@@ -21,6 +21,12 @@ from tests.terminal_screen import Terminal
 # The scenarios of the shipped systems are tests, too; `pytester` runs pytest within tests.
 pytest_plugins = ('pytester', *PLUGINS)
 
+# Ports of shared memory have numbers that all domains of a computer share, and of processes that
+# start or end at the same moment, one may remove the port of another: Fast DDS gives its semaphore a
+# new file while others wait at the old one. Who lost it never hears of any node. The kernel gives a
+# port of UDP to one process alone.
+os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+
 # What hypothesis tries is the same in each run, and no test fails for the time that it takes.
 settings.register_profile(
     'steady',
@@ -70,6 +76,12 @@ def domain_id(monkeypatch):
     with reserved_domain() as domain:
         monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
         yield domain
+
+
+@pytest.fixture
+def shared_memory(monkeypatch):
+    """Let the processes of a test use shared memory, as Fast DDS does by itself."""
+    monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS')
 
 
 @pytest.fixture

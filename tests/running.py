@@ -26,9 +26,6 @@ PATIENCE_SEC = 8.0
 _FIRST_DOMAIN, _DOMAINS = 10, 91
 # Threads of behaviours have the names that Python gives them.
 _DEAD = re.compile(r'Exception in thread (?!Thread-\d+ \((?!_))')
-# Fast DDS prints this of ports of shared memory, which processes of all domains have in common:
-# when another one holds the lock of a port that is gone.
-_OF_OTHERS = 'RTPS_TRANSPORT_SHM'
 _domain_offsets = count(os.getpid() * 7)
 _peers = []
 
@@ -52,11 +49,6 @@ def wait_for(condition, what, timeout_sec=DEADLINE_SEC):
         time.sleep(min(max(_PAUSE_SEC, 3 * (time.monotonic() - looked)), 5 * _PAUSE_SEC))
         looked = time.monotonic()
     return result
-
-
-def read_line(stream):
-    """Return the next line of a program that is its own, or '' at its end."""
-    return next(line for line in iter(stream.readline, None) if _OF_OTHERS not in line)
 
 
 def descendants(pid):
@@ -86,7 +78,6 @@ def reserved_domain():
     """Return a ROS domain that no process is in, and that no other run of tests takes meanwhile."""
     with ExitStack() as reserved:
         domain = next(domain for domain in _domains() if _reserve(domain, reserved))
-        _remove_left_ports(domain)
         yield domain
 
 
@@ -107,19 +98,6 @@ def _reserve(domain, reserved):
         except OSError:
             return False
     return True
-
-
-def _remove_left_ports(domain):
-    """Remove the ports of shared memory that killed processes have left in a domain.
-
-    A plain program that gets one of these may hear nothing, or nobody hears it.
-    """
-    numbers = range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
-    for path in Path('/dev/shm').glob('*port*'):
-        found = re.fullmatch(r'(sem\.)?fast(rtps|dds)_port(\d+)(_el|_mutex)?', path.name)
-        if found and int(found[3]) in numbers:
-            with suppress(OSError):
-                path.unlink()
 
 
 class Child:
@@ -229,7 +207,7 @@ class Child:
                     b'\n'
                 )
                 lines = [line.decode(errors='replace').rstrip('\r') for line in lines]
-                self._lines += [line for line in lines if _OF_OTHERS not in line]
+                self._lines += lines
                 self._up = self._up or any(' ready in ' in line for line in lines)
                 self._grown.notify_all()
 

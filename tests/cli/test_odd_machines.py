@@ -123,6 +123,7 @@ LACKING = {
 }
 
 
+@pytest.mark.usefixtures('shared_memory')
 @pytest.mark.parametrize('lacking', LACKING)
 def test_what_else_a_machine_lacks_is_told_in_one_line(run, lacking):
     prefix, before = LACKING[lacking]

@@ -26,7 +26,11 @@ class Part:
         # The home folder, where logs and caches are, is that of the host alone.
         home = folder / f'home_{host.name}'
         home.mkdir(exist_ok=True)
-        passed = {name: each for name, each in os.environ.items() if not name.startswith('ROS_')}
+        passed = {
+            name: each
+            for name, each in os.environ.items()
+            if not name.startswith(('ROS_', 'FASTDDS_'))
+        }
         variables = {
             'HOME': str(home),
             'ROS_DOMAIN_ID': str(_DOMAIN),

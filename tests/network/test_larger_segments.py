@@ -128,6 +128,7 @@ def test_the_room_that_is_checked_is_what_the_profile_takes():
     assert sizes == [SEGMENT_BYTES]
 
 
+@pytest.mark.usefixtures('shared_memory')
 @pytest.mark.ros
 def test_large_messages_of_best_effort_cross_between_workers_that_an_edit_adds(compose):
     child = compose(EYE, CODE, '--watch')
@@ -141,6 +142,7 @@ def test_large_messages_of_best_effort_cross_between_workers_that_an_edit_adds(c
     assert arrived >= 17
 
 
+@pytest.mark.usefixtures('shared_memory')
 @pytest.mark.ros
 def test_the_workers_of_a_start_get_the_profile(compose):
     code = """

@@ -110,6 +110,7 @@ def run_program(compose):
     return run
 
 
+@pytest.mark.usefixtures('shared_memory')
 def test_many_systems_in_a_row_leave_nothing_behind(compose, run_program):
     path = compose.write(SYSTEM, CODE)
     result = json.loads(run_program(PROGRAM, path.name, 4))

@@ -7,8 +7,6 @@ pytest.importorskip('test_msgs')
 
 from std_srvs.srv import Trigger
 
-from tests.running import read_line
-
 pytestmark = pytest.mark.ros
 
 CODE = """
@@ -104,8 +102,6 @@ import time
 import rclpy
 from std_srvs.srv import Trigger
 
-from tests.running import read_line
-
 def answer(request, response):
     if sys.argv[1] == 'hang':
         print('asked', flush=True)
@@ -127,7 +123,7 @@ def plain_server(domain_id, start_program):
 
     def start(how):
         process = start_program('-c', PEER_CODE, how)
-        assert read_line(process.stdout) == 'up\n'
+        assert process.stdout.readline() == 'up\n'
         return process
 
     return start
@@ -278,7 +274,7 @@ def test_a_signal_ends_an_on_start_that_waits_for_a_response(compose, plain_serv
     plain = plain_server('hang')
     child = compose(asking('on_start: parts:wait_long_async'), CODE)
     child.wait_for_line('asking')
-    assert read_line(plain.stdout) == 'asked\n'
+    assert plain.stdout.readline() == 'asked\n'
 
     assert child.stop(once_up=False) == 130
     assert 'rror' not in child.output

@@ -137,6 +137,7 @@ def locks_of(child):
     return [path for path in files if re.fullmatch('fast(rtps|dds)_[0-9a-f]{16}_el', path.name)]
 
 
+@pytest.mark.usefixtures('shared_memory')
 @pytest.mark.ros
 def test_a_start_removes_what_a_killed_system_left(compose):
     children = [compose.run(compose.write(SYSTEM, name=name)) for name in ('killed', 'living')]
