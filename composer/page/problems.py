@@ -35,7 +35,11 @@ def list_problems(
         rates: How often a timer is to be called, in Hz, likewise.
     """
     states = status.get('lifecycles', {}).items()
-    resting = {*status.get('stopped', ()), *(node for node, state in states if state != 'active')}
+    resting = {
+        *status.get('stopped', ()),
+        *status.get('awaited', ()),
+        *(node for node, state in states if state != 'active'),
+    }
     awake = {key: rate for key, rate in rates.items() if key.split(':')[1] not in resting}
     found = [*_of_system(status, health, outside), *_of_entities(health, topics, awake)]
     return sorted(found, key=lambda each: _ORDER.get(each['level'], 3))
@@ -52,11 +56,14 @@ def _of_system(
 ) -> Iterator[dict[str, str]]:
     if status.get('last_error'):
         yield _problem('error', f'the last reload failed: {status["last_error"]}')
-    for node in status.get('stopped', ()):
-        yield _problem('warn', f'{node} was stopped', node)
-    for node, state in status.get('lifecycles', {}).items():
-        if state != 'active':
-            yield _problem('warn', f'{node} is {state}, and not active', node)
+    states = status.get('lifecycles', {}).items()
+    told = [
+        *((node, 'was stopped') for node in status.get('stopped', ())),
+        *((who, f'waits for {what}') for who, what in status.get('awaited', {}).items()),
+        *((node, f'is {state}, and not active') for node, state in states if state != 'active'),
+    ]
+    for who, what in told:
+        yield _problem('warn', f'{who} {what}', who if who.startswith('/') else '')
     for process in health.get('external_processes', ()):
         if process['level'] != 'ok':
             yield _problem(process['level'], f"process '{process['name']}': {process['message']}")

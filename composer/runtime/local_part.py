@@ -141,6 +141,7 @@ class LocalPart:
         self._handle = self._create_handle(elsewhere, ros_arguments, log_levels)
         self._programs = ExternalPrograms(spec, self._handle, self._nodes, self._end)
         self._processes, self._starter = self._programs.processes, self._programs.starter
+        self.state.find_awaited = self._starter.awaited.copy
         self.state.find_processes = lambda: describe_processes(
             list(self._processes.by_name.values())
         )

@@ -55,6 +55,7 @@ class Starter:
         self.components = components
         self._processes = processes
         self._system = system
+        self.awaited: dict[str, str] = {}
 
     def create(self, specs: Iterable[NodeSpec]) -> list[LiveNode]:
         """Create nodes with all their entities; none of their behaviours is called yet.
@@ -207,6 +208,7 @@ class Starter:
             self._nodes,
             self._system.elsewhere,
             self._system.positions,
+            self.awaited,
         )
 
     def _list_late(

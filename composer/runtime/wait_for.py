@@ -59,6 +59,7 @@ class Waiter:
 
     Attributes:
         label: As in `node 'arm'`.
+        key: The full name of the node or component; the label of a process.
         delay_sec: Time between the moment when they hold and its start.
         resolve: Returns the full name for a condition.
         log: Takes what it waits for.
@@ -67,6 +68,7 @@ class Waiter:
     """
 
     label: str
+    key: str
     conditions: tuple[ConditionSpec, ...]
     delay_sec: float
     resolve: Callable[[ConditionSpec], str]
@@ -88,6 +90,7 @@ class WaitingStarter:
         executor: Spins the node that asks other nodes for their states.
         nodes: The nodes of the system; what is in those that have not started does not count.
         elsewhere: What of the system is not in these nodes.
+        awaited: Has what each waits for, by its key, for as long as it waits.
     """
 
     def __init__(
@@ -97,6 +100,7 @@ class WaitingStarter:
         nodes: Mapping[str, LiveNode],
         elsewhere: Elsewhere,
         positions: SourceMap,
+        awaited: dict[str, str],
     ) -> None:
         self._context = context
         self._executor = executor
@@ -104,6 +108,7 @@ class WaitingStarter:
         self._nodes = nodes
         self._elsewhere = elsewhere
         self._positions = positions
+        self._awaited = awaited
         self._notices: dict[DataPath | int, WaitNotice] = {}
         # When the conditions of a waiter held first.
         self._held: dict[int, float] = {}
@@ -136,13 +141,16 @@ class WaitingStarter:
                         message = f'{pending[0].label}: the files have changed while it waited'
                         raise StartError(message)
                     started = self._start_ready(pending, node, begun, stop)
-                    pending = [
-                        each for each in pending if each not in started and each.is_wanted()
-                    ]
+                    for waiter in [*pending]:
+                        if waiter in started or not waiter.is_wanted():
+                            pending.remove(waiter)
+                            self._awaited.pop(waiter.key, None)
                     if not started:
                         with suppress(Empty):
                             woken.get(timeout=_POLL_SEC)
         finally:
+            for waiter in pending:
+                self._awaited.pop(waiter.key, None)
             self._executor.remove_node(node)
             self._remotes.clear()
             node.destroy_node()
@@ -163,12 +171,16 @@ class WaitingStarter:
                 if now >= held + waiter.delay_sec:
                     ready.append(waiter)
                 else:
-                    self._delay_notice(waiter).log_if_due(held)
+                    notice = self._delay_notice(waiter)
+                    self._awaited[waiter.key] = notice.what
+                    notice.log_if_due(held)
             for condition in missing:
                 if waited_sec >= condition.timeout_sec or self._is_hopeless(condition):
                     raise self._error(waiter, condition, graph)
+                notice = self._notice(waiter, condition)
+                self._awaited[waiter.key] = notice.what
                 # At the same time: what has waited long enough has no notice first.
-                self._notice(waiter, condition).log_if_due(begun, now)
+                notice.log_if_due(begun, now)
         for waiter in ready:
             if not stop.is_set:
                 waiter.start()
@@ -268,7 +280,8 @@ def list_waiters(
     return [
         *(
             Waiter(
-                f"process '{process.spec.name}'",
+                (label := f"process '{process.spec.name}'"),
+                label,
                 process.spec.wait_for,
                 process.spec.delay_sec,
                 partial(_resolve_of_process, process.spec),
@@ -281,6 +294,7 @@ def list_waiters(
         *(
             Waiter(
                 f"node '{node.spec.name}'",
+                node.full_name,
                 node.spec.wait_for,
                 node.spec.delay_sec,
                 partial(_resolve_of_node, node),

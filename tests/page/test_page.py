@@ -365,6 +365,7 @@ def test_drops_are_told_with_who_publishes_too_fast(figures, text):
         (0.0, {'stopped': ['/a']}, False),
         (0.0, {'lifecycles': {'/a': 'active'}}, True),
         (0.0, {'lifecycles': {'/a': 'inactive'}}, False),
+        (0.0, {'awaited': {'/a': "service '/map'"}}, False),
     ],
 )
 def test_a_timer_that_is_never_called_is_told(rate_hz, status, is_told):

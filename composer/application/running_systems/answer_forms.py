@@ -30,6 +30,7 @@ STATUS: Final[Form] = {
     'components': [str],
     'stopped': [str],
     'lifecycles': {str: str},
+    'awaited': {str: str},
     'external_processes': [_EXTERNAL],
     'workers': [{'name': str}],
     'health': (NoneType, {'level': str, 'message': str}),

@@ -115,6 +115,9 @@ def _notes(system: RunningSystem) -> list[str]:
             for node, state in status['lifecycles'].items()
             if state != 'active'
         ),
+        'not started': ', '.join(
+            f'{who} waits for {what}' for who, what in status['awaited'].items()
+        ),
     }
     texts = {key: escape(' '.join(text.split())) for key, text in told.items() if text}
     return [f'{escape(system.name)}: {key}: {text[:_LONGEST_NOTE]}' for key, text in texts.items()]

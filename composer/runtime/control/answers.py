@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from composer.runtime.behaviours.running_calls import Owner
@@ -72,10 +73,9 @@ def status_answer(
         if (state := each['state']) in _WORKER_STATES
     ]
     merged = {
-        'lifecycles': {
-            node: state
-            for one in (own, *workers.values())
-            for node, state in one['lifecycles'].items()
+        **{
+            key: dict(chain(*(one[key].items() for one in (own, *workers.values()))))
+            for key in ('lifecycles', 'awaited')
         },
         'health': max(healths, key=lambda each: _LEVELS.index(each['level']), default=None),
         'workers': list(states),

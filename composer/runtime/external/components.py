@@ -108,6 +108,7 @@ class Components:
             needed.insert(0, ConditionSpec('process', spec.name, timeout_sec, 'running', path))
         return Waiter(
             f"component '{component.key}'",
+            component.full_name,
             (*needed, *component.wait_for),
             0.0,
             partial(_resolve, component),

@@ -55,6 +55,8 @@ class SystemState:
         is_stopping: Whether a stop was requested.
         last_reload: `None` before the first.
         find_lifecycles: Returns the states of the nodes with a lifecycle, by their full names.
+        find_awaited: Returns what each node or process that has not started waits for, by the full
+            name of the node or as in `process 'camera'`.
         find_processes: Returns the external processes, as `describe_processes` does.
         stopped: The full names of the nodes that somebody has stopped.
         clock_problem: What keeps the clocks of nodes from going; empty if nothing does.
@@ -69,6 +71,7 @@ class SystemState:
         self.is_stopping = False
         self.last_reload: ReloadReport | None = None
         self.find_lifecycles: Callable[[], Mapping[str, str]] = dict
+        self.find_awaited: Callable[[], Mapping[str, str]] = dict
         self.find_processes: Callable[[], list[dict[str, Any]]] = list
         self.stopped: list[str] = []
         self.clock_problem = ''
@@ -130,6 +133,7 @@ class SystemState:
             'last_error': self.last_error,
             'stopped': self.stopped,
             'lifecycles': dict(self.find_lifecycles()),
+            'awaited': dict(self.find_awaited()),
             'external_processes': self.find_processes(),
             'last_reload': last
             and {

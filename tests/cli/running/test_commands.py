@@ -266,6 +266,7 @@ def test_those_who_only_pretend_to_be_systems_hide_none(composer, peer):
         'components': [],
         'stopped': [],
         'lifecycles': {},
+        'awaited': {},
         'external_processes': [],
         'workers': [],
     }
@@ -391,3 +392,34 @@ def test_nodes_stop_and_start(compose, composer, wait_for):
     assert ask()[1] == []
     child.wait_for_line('count 1001')
     assert child.stop() == 0, child.output
+
+
+def test_what_has_not_started_is_told_with_what_it_waits_for(compose, composer, peer, wait_for):
+    from std_srvs.srv import Trigger
+
+    text = """
+        version: 1
+        nodes:
+          late: {wait_for: {service: '/map', timeout: 3600}}
+          slow: {delay: 3600}
+          far: {worker: w, wait_for: {topic: scan, timeout: 3600}}
+        processes: {driver: {command: [sleep, '600'], wait_for: {node: late, timeout: 3600}}}
+    """
+    child = compose(text)
+
+    def awaited():
+        systems = json.loads(composer('ps', '--format', 'json')[1])['systems']
+        return systems[0]['awaited'] if systems else {}
+
+    wait_for(lambda: len(awaited()) == 4, awaited)
+    assert awaited() == {
+        '/late': "service '/map'",
+        '/slow': 'its delay of 3600 s',
+        '/far': "a publisher of '/scan'",
+        "process 'driver'": "node '/late'",
+    }
+    told = composer('ps')[1]
+    assert "system: not started: process 'driver' waits for node '/late', /late waits for" in told
+    peer.run(peer.node.create_service, Trigger, '/map', lambda _, response: response)
+    wait_for(lambda: set(awaited()) == {'/slow', '/far'}, awaited)
+    assert child.stop(once_up=False) == 130

@@ -28,9 +28,11 @@ def tick(node):
 
 def test_a_name_is_had_once_and_told_of(domain_id):
     first, second = (NameClaim('_composer_a', domain_id) for _ in range(2))
+    elsewhere = NameClaim('_composer_a', domain_id + 100)
     assert first.take({'name': 'a', 'file': 'a.yaml'}) is None
     assert second.take({'name': 'a'}) == {'name': 'a', 'file': 'a.yaml', 'pid': os.getpid()}
-    assert NameClaim('_composer_a', domain_id + 100).take({}) is None
+    assert elsewhere.take({}) is None
+    elsewhere.release()
     assert [each['name'] for each in list_claims(domain_id)] == ['a']
     first.release()
     assert list_claims(domain_id) == []
