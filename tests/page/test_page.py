@@ -735,7 +735,14 @@ def test_hostile_texts_stay_text(compose, browser, peer):
     assert len(answer) <= 100_001
     browser.get(f'http://127.0.0.1:{page.port}/#topic%3A%2Fnames')
     click(browser, '#message button')
-    wait_for(lambda: '<img src=x' in contents('#message pre'), 'the message')
+
+    def is_shown():
+        # On a crowded machine none may come in time, and the page asks for no more.
+        if text_of('#message button') == 'Go on':
+            click(browser, '#message button')
+        return '<img src=x' in contents('#message pre')
+
+    wait_for(is_shown, 'the message')
     find('#search')[0].send_keys('ear\n')
     wait_for(lambda: text_of('#details h2').startswith('/ear'), 'the page to be usable')
     values = 'return document.querySelector("#parameters input")?.value ?? ""'
@@ -952,7 +959,8 @@ def test_a_browser_stops_and_starts_a_node_and_records(acting, browser):
     browser.get(acting.address)
     # As if a drawing came before the page gets to know its new address.
     browser.execute_script(
-        'location.hash = "node%3A%2Fleft%2Ftalker"; history.replaceState(null, "", "/")'
+        'const newURL = `${location.href}#node%3A%2Fleft%2Ftalker`;'
+        'dispatchEvent(new HashChangeEvent("hashchange", {newURL}))'
     )
     for verb, then in (('Stop', 'Start'), ('Start', 'Restart')):
         script = (
