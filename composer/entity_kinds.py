@@ -90,6 +90,11 @@ class EntityKind:
         """The noun as names of rules have it, as in `service-client`."""
         return self.noun.replace(' ', '-')
 
+    @property
+    def sends(self) -> bool:
+        """Whether it sends: publishers send messages, and clients requests and goals."""
+        return self.provides == (self.channel == 'topic')
+
 
 _BEHAVIOUR = 'unknown:unknown'
 

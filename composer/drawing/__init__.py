@@ -25,11 +25,9 @@ def render_picture(picture: Picture, format_name: str) -> str:
     from composer.drawing.graphviz import render_dot, render_svg
     from composer.drawing.json_document import render_json
     from composer.drawing.mermaid import render_mermaid
+    from composer.drawing.shapes import arrange
 
-    renderers = {
-        'mermaid': render_mermaid,
-        'dot': render_dot,
-        'json': render_json,
-        'svg': render_svg,
-    }
-    return renderers[format_name](picture)
+    if format_name == 'json':
+        return render_json(picture)
+    renderers = {'mermaid': render_mermaid, 'dot': render_dot, 'svg': render_svg}
+    return renderers[format_name](arrange(picture))

@@ -50,9 +50,8 @@ def deliveries_of(channel: Channel, profiles: Mapping[str, QosSpec]) -> dict[Dat
     """Return the way of what each end of a channel sends or gets, by the path of the end."""
     is_topic = channel.kind == 'topic'
     policies = {end.path: policies_of(end, profiles) for end in channel.ends}
-    senders, receivers = channel.providers, channel.users
-    if not is_topic:
-        senders, receivers = receivers, senders
+    senders = [end for end in channel.ends if end.kind.sends]
+    receivers = [end for end in channel.ends if not end.kind.sends]
     sent: dict[DataPath, Delivery] = {}
     heard: dict[DataPath, list[Delivery]] = {end.path: [] for end in receivers}
     for sender in senders:

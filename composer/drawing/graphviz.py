@@ -18,15 +18,14 @@ import sys
 from typing import TYPE_CHECKING
 
 from composer.drawing.picture import Box
-from composer.drawing.shapes import arrange
 from composer.errors import ComposerError
 from composer.terminal import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
-    from composer.drawing.picture import Part, Picture
-    from composer.drawing.shapes import Region
+    from composer.drawing.picture import Part
+    from composer.drawing.shapes import Arrangement, Region
 
 _FONT = 'Helvetica,Arial,sans-serif'
 _SHAPES = {
@@ -84,14 +83,13 @@ _COMMENT = re.compile(r'<!--.*?-->\n?', re.DOTALL)
 _TITLE = re.compile(r'(<g id="([^"]*)"[^>]*>\n)<title>[^<]*</title>\n')
 
 
-def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
+def render_dot(drawn: Arrangement, direction: str = 'LR') -> str:
     """Return a picture as a directed graph; each element has an `id` and a `class` for SVG.
 
     Args:
-        folded: See `arrange`.
         direction: Of messages, as Graphviz names it: `LR` or `TB`.
     """
-    drawn = arrange(picture, folded)
+    picture = drawn.picture
     is_compact = len(picture.nodes) > _MOST_DETAILED
     separations, margin, inner = _COMPACT if is_compact else _ROOMY
     separations, fonts = separations.format(_RANK_SEPARATIONS[direction]), f'fontname="{_FONT}"'
@@ -105,7 +103,7 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
         for each in (each for each in region.inner if not each.is_folded):
             yield f'{indent}subgraph cluster_{each.token} {{'
             yield (
-                f'{indent}  graph [label=<{_text(each.title)}>, id="{each.token}", '
+                f'{indent}  graph [label=<{_text(each.name)}>, id="{each.token}", '
                 f'class="{each.kind}", labeljust=l, {inner}, {_REGIONS[each.kind]}]'
             )
             yield from draw_region(each, depth + 1)
@@ -128,10 +126,9 @@ def render_dot(picture: Picture, folded: Collection[str] = (), direction: str = 
 
 
 def _look(part: Part, styles: Mapping[str, str], *, is_compact: bool) -> str:
-    """Return the attributes of a box or a line, which only shows the name of a topic."""
-    topic = getattr(part, 'topic', '')
-    lines = [f'<B>{_text(part.name)}</B>'] if isinstance(part, Box) else []
-    lines += [_text(topic)] if topic else []
+    """Return the attributes of a box or a line."""
+    name = _text(part.name)
+    lines = [f'<B>{name}</B>' if isinstance(part, Box) else name] if name else []
     # What stands for several says how many these are.
     details = part.details if not is_compact or part.token[0] in 'gm' else ()
     lines += [_font(line, _GREY) for line in details]
@@ -158,18 +155,13 @@ def _text(text: str) -> str:
     return html.escape(escape(text).replace('\\', '\\\\'))
 
 
-def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 'LR') -> str:
-    """Return a picture as an SVG document.
-
-    Args:
-        folded: See `arrange`.
-        direction: See `render_dot`.
+def render_svg(drawn: Arrangement, direction: str = 'LR') -> str:
+    """Return a picture as an SVG document; see `render_dot`.
 
     Raises:
         ComposerError: Graphviz is missing or failed.
     """
-    drawn = _COMMENT.sub('', lay_out(render_dot(picture, folded, direction)))
-    titles = {}
+    picture, titles = drawn.picture, {}
     for part in picture.parts:
         said = [picture.findings[index].message for index in part.findings]
         titles[part.token] = '\n'.join(map(escape, [part.title, *part.facts, *said]))
@@ -178,15 +170,12 @@ def render_svg(picture: Picture, folded: Collection[str] = (), direction: str = 
         title = titles.get(match[2])
         return f'{match[1]}<title>{html.escape(title)}</title>\n' if title else match[1]
 
-    return _TITLE.sub(entitle, drawn).rstrip() + '\n'
+    document = _COMMENT.sub('', _lay_out(render_dot(drawn, direction)))
+    return _TITLE.sub(entitle, document).rstrip() + '\n'
 
 
-def lay_out(text: str) -> str:
-    """Return a text in the DOT language as an SVG document.
-
-    Raises:
-        ComposerError: Graphviz is missing or failed.
-    """
+def _lay_out(text: str) -> str:
+    """Return a text in the DOT language as an SVG document."""
     try:
         done = subprocess.run(  # noqa: S603 - the program is Graphviz, the text its input
             _command(), input=text.encode(), capture_output=True, timeout=_LIMIT_SEC, check=False

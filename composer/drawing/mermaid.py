@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from composer.drawing.shapes import arrange
 from composer.terminal import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from composer.drawing.picture import Part, Picture
-    from composer.drawing.shapes import Region
+    from composer.drawing.picture import Part
+    from composer.drawing.shapes import Arrangement, Region
 
 _SHAPES = {
     'node': ('([', '])'),
@@ -40,9 +39,8 @@ _LINE_STYLES = {
 _PLAIN = frozenset(" _/.,:()=+-'")
 
 
-def render_mermaid(picture: Picture) -> str:
+def render_mermaid(drawn: Arrangement) -> str:
     """Return a picture as a flowchart."""
-    drawn = arrange(picture)
     lines = ['flowchart LR', *_region(drawn.root, 1)]
     for line in drawn.lines:
         text = f'|"{label}"|' if (label := _label(line)) else ''
@@ -60,15 +58,13 @@ def _region(region: Region, depth: int) -> Iterator[str]:
         style = f'{closing}:::{box.mark or box.kind}'
         yield f'{indent}{box.token}{opening}"{_label(box)}"{style}'
     for inner in region.inner:
-        yield f'{indent}subgraph {inner.token}["{_escape(inner.title)}"]'
+        yield f'{indent}subgraph {inner.token}["{_escape(inner.name)}"]'
         yield from _region(inner, depth + 1)
         yield f'{indent}end'
 
 
 def _label(part: Part) -> str:
-    # A line shows no name of its own.
-    lines = (getattr(part, 'topic', part.name), *part.details, *part.remarks)
-    return '<br/>'.join(map(_escape, filter(None, lines)))
+    return '<br/>'.join(map(_escape, filter(None, (part.name, *part.details, *part.remarks))))
 
 
 def _escape(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from itertools import count
 from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -38,18 +38,8 @@ Side: TypeAlias = Literal['providers', 'users']
 
 # Policies whose values are clear without their names.
 _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
-# By its path a part is found in the file; messages of findings hide the values themselves.
-_NEVER_HIDDEN = {
-    'token',
-    'kind',
-    'role',
-    'path',
-    'findings',
-    'remarks',
-    'mark',
-    'external',
-    'place',
-}
+# What quotes the file; messages of findings hide values themselves.
+_QUOTING = ('id', 'name', 'details', 'namespace', 'description', 'type', 'start', 'end')
 
 
 @record
@@ -106,13 +96,22 @@ class Box(Part):
     def facts(self) -> list[str]:
         """What there is to say of it."""
         place = '' if self.details else describe_place(self.place)
-        external = [
-            f'external {kind.noun}s'
-            for kind in CHANNEL_KINDS
-            if kind.channel == self.kind
-            and ('providers' if kind.provides else 'users') in self.external
-        ]
+        external = [edge.node.name for edge in self.outside]
         return [*filter(None, (self.description, place)), *self.details, *external]
+
+    @property
+    def outside(self) -> list[Edge]:
+        """A line for each kind of ends outside; all channels share the box of a kind."""
+        lines = []
+        for kind in CHANNEL_KINDS:
+            side = 'providers' if kind.provides else 'users'
+            if kind.channel == self.kind and side in self.external:
+                token = f'x{kind.channel[0]}{side[0]}'
+                box = Box(token, 'external', name=f'external {kind.noun}s')
+                start, end = (box, self) if kind.sends else (self, box)
+                token = f'x{self.token}{side[0]}'
+                lines.append(Edge(token, 'external', start=start, end=end, role=kind.noun))
+        return lines
 
 
 _NOTHING = Box('', '')
@@ -131,7 +130,6 @@ class Edge(Part):
         qos: The policies that differ from the default of ROS; durations in seconds.
         delivery: Which way its messages, calls or goals go.
         by_parameter: The parameters that its name or depth follows, by these keys.
-        topic: The name that it shows, as it is drawn in place of its topic.
     """
 
     start: Box = _NOTHING
@@ -141,7 +139,6 @@ class Edge(Part):
     qos: Mapping[str, Any] = field(default_factory=dict)
     delivery: Delivery = Delivery()
     by_parameter: Mapping[str, str] = field(default_factory=dict)
-    topic: str = ''
 
     @property
     def node(self) -> Box:
@@ -189,21 +186,15 @@ def build_picture(context: CheckContext, findings: Sequence[Diagnostic]) -> Pict
     nodes, channels = tuple(_nodes(context, marks)), tuple(_channels(context.topology, marks))
     boxes = {box.id: box for box in (*nodes, *channels)}
     at = {node.path: node for node in nodes}
-    picture = Picture(
-        context.spec.name,
-        context.spec.description,
-        nodes,
-        channels,
-        tuple(_edges(context, marks, boxes, at)),
-        tuple(_waits(context, boxes, at)),
-        tuple(findings),
-        context.system.positions,
-    )
-    return _concealed(picture, {}) if hidden_values() else picture
+    edges, waits = tuple(_edges(context, marks, boxes, at)), tuple(_waits(context, boxes, at))
+    shown = (context.spec.name, context.spec.description, nodes, channels, edges, waits)
+    if hidden_values():
+        shown = _concealed(shown, {})
+    return Picture(*shown, tuple(findings), context.system.positions)
 
 
 def _concealed(value: Any, shown: dict[str, str]) -> Any:
-    """Return a part of a picture with the origins of hidden values in their place.
+    """Return parts of a picture with the origins of hidden values in their place.
 
     Args:
         shown: What is shown for each text so far: for those that differ, it does, too.
@@ -216,8 +207,8 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
         return shown[value]
     if isinstance(value, tuple):
         return tuple(_concealed(each, shown) for each in value)
-    if isinstance(value, Picture | Part):
-        names = (each.name for each in fields(value) if each.name not in _NEVER_HIDDEN)
+    if isinstance(value, Part):
+        names = (name for name in _QUOTING if hasattr(value, name))
         return replace(value, **{name: _concealed(getattr(value, name), shown) for name in names})
     return value
 
@@ -292,7 +283,7 @@ def _edges(
             inner = '' if node.path == end.node.path else str(end.node.path[-1])
             owner = '/'.join(filter(None, (node.id.partition(':')[2], inner)))
             ways = (node, boxes[f'{channel.kind}:{channel.name}'])
-            if not sends(channel.kind, provides=end.kind.provides):
+            if not end.kind.sends:
                 ways = ways[::-1]
             noun = end.kind.noun
             qos = _differing_policies(end, context.spec.qos)
@@ -335,11 +326,6 @@ def _differing_policies(end: Endpoint, profiles: Mapping[str, QosSpec]) -> dict[
     policies = policies_of(end, profiles) or {}
     usual = BUILTIN_PROFILES[DEFAULT_PROFILE]
     return {key: value for key, value in policies.items() if value != usual.get(key, INFINITE)}
-
-
-def sends(channel: str, *, provides: bool) -> bool:
-    """Return whether an end sends: publishers send messages, and clients requests and goals."""
-    return provides == (channel == 'topic')
 
 
 def _waits(

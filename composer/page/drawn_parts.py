@@ -17,10 +17,9 @@ from composer.confidential import may_show_lines
 from composer.diagnostics import describe_finding, relative_path
 from composer.drawing.graphviz import render_svg
 from composer.drawing.picture import Box, Edge, build_picture
-from composer.drawing.shapes import arrange, count_kinds, list_outside
+from composer.drawing.shapes import arrange, count_kinds
 from composer.errors import ComposerError
 from composer.interfaces.catalogue import InterfaceCatalogue
-from composer.language.bindings import node_bindings
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from composer.checks.context import CheckContext
-    from composer.diagnostics import SourceFile, Span
+    from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.drawing.picture import Part, Picture, Side
     from composer.drawing.shapes import Arrangement, Region
     from composer.language.specs import BehaviourSpec
@@ -77,7 +76,7 @@ def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence
     if context is None:
         texts = [f'{each.span or each.file}: {each.message}' for each in findings]
         raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
-    return Drawing(build_picture(context, findings), _list_code(context), _list_rates(context))
+    return Drawing(context, findings)
 
 
 def _list_rates(context: CheckContext) -> dict[str, float]:
@@ -92,35 +91,24 @@ def _list_rates(context: CheckContext) -> dict[str, float]:
 
 
 def _find_kind(context: CheckContext, behaviour: BehaviourSpec) -> FunctionKind | None:
-    module = context.modules.find(behaviour.module) if behaviour.module else None
-    if not isinstance(module, ModuleSource) or behaviour.function not in module.functions:
-        return None
-    return module.functions[behaviour.function].kind
+    function = context.modules.find_function(behaviour.module, behaviour.function)
+    return function.kind if function else None
 
 
 def _list_code(context: CheckContext) -> dict[str, list[Excerpt]]:
     """Return the lines of the functions of each node, by its id."""
-    return {
-        f'node:{node.full_name}': [
-            lines
-            for binding in node_bindings(node)
-            if (lines := _find_code(context, binding.owner, binding.behaviour))
-        ]
-        for node in context.spec.nodes.values()
-    }
-
-
-def _find_code(context: CheckContext, owner: str, behaviour: BehaviourSpec) -> Excerpt | None:
-    module = context.modules.find(behaviour.module) if behaviour.module else None
-    if not isinstance(module, ModuleSource) or module.path is None:
-        return None
-    function = module.functions.get(behaviour.function)
-    found = (function.definition or function.class_definition) if function else None
-    if found is None or not context.modules.is_of_project(behaviour.module):
-        return None
-    last = min(found.end_lineno or found.lineno, found.lineno + _MOST_CODE_LINES - 1)
-    lines = tuple(module.lines[found.lineno - 1 : last])
-    return Excerpt(relative_path(str(module.path)), found.lineno, lines, owner)
+    modules, code = context.modules, defaultdict(list)
+    for node in context.spec.nodes.values():
+        for binding in context.bindings(node):
+            name = binding.behaviour.module
+            module = modules.find(name)
+            function = modules.find_function(name, binding.behaviour.function)
+            found = function and (function.definition or function.class_definition)
+            if found and isinstance(module, ModuleSource) and modules.is_of_project(name):
+                lines = module.lines[found.lineno - 1 : found.end_lineno][:_MOST_CODE_LINES]
+                excerpt = Excerpt(module.source.name, found.lineno, lines, binding.owner)
+                code[f'node:{node.full_name}'].append(excerpt)
+    return code
 
 
 class Drawing:
@@ -136,13 +124,9 @@ class Drawing:
         ComposerError: Graphviz is missing or failed.
     """
 
-    def __init__(
-        self,
-        picture: Picture,
-        code: Mapping[str, list[Excerpt]] | None = None,
-        rates: Mapping[str, float] | None = None,
-    ) -> None:
-        self._picture, self._declared, self._code = picture, picture.channels, code or {}
+    def __init__(self, context: CheckContext, findings: Sequence[Diagnostic]) -> None:
+        self._picture = picture = build_picture(context, findings)
+        self._declared, self._code = picture.channels, _list_code(context)
         self._first = _fold_many(picture)
         # The one that is read with less zooming stays.
         is_tried = self._first or len(picture.nodes) <= _MOST_NODES_TRIED
@@ -150,7 +134,7 @@ class Drawing:
         self.name = picture.name
         self.nodes = {part.id[5:] for part in picture.nodes if part.kind == 'node'}
         self.topics = [part.id[6:] for part in picture.channels if part.kind == 'topic']
-        self.rates = rates or {}
+        self.rates = _list_rates(context)
         self.topic_of_ends = {edge.id: edge.channel.id for edge in picture.edges}
         self._lock = threading.Lock()
         self._fold = lru_cache(_MOST_FOLDED)(self._describe)
@@ -183,10 +167,10 @@ class Drawing:
             self._fold.cache_clear()
 
     def _describe(self, folded: frozenset[str]) -> dict[str, Any]:
+        drawn = arrange(self._picture, folded)
         with ThreadPoolExecutor() as pool:
             # Graphviz has another process for each, and takes as long as the rest.
-            layouts = pool.map(partial(render_svg, self._picture, folded), self._directions)
-            drawn = arrange(self._picture, folded)
+            layouts = pool.map(partial(render_svg, drawn), self._directions)
             parts = dict(_parts(self._picture, self._code))
             parts |= {region.token: _box(region, drawn, parts) for region in drawn.regions}
             parts |= dict(_bundles(drawn, parts))
@@ -241,7 +225,7 @@ def _parts(
             edges[box.token].append(edge)
     for part in picture.parts:
         kind, near = part.kind, edges[part.token]
-        outside = [*list_outside(part)] if isinstance(part, Box) else []
+        outside = part.outside if isinstance(part, Box) else []
         if isinstance(part, Edge):
             kind, near = part.role, [part.start, part.end]
         # Of a channel, the lines of its ends.
@@ -264,7 +248,7 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
     members = {box.token: box.kind for box in region.all_boxes()}
     ends = dict.fromkeys(end for each in members if each in parts for end in parts[each]['near'])
     near = [end for end in ends if len(members.keys() & set(parts[end]['near'])) == 1]
-    name = region.title.removeprefix(f'{region.kind} ')
+    name = region.name.removeprefix(f'{region.kind} ')
     facts = [', '.join(count_kinds(members.values()))]
     return {
         **_part(region.id, region.kind, name, facts, near),
@@ -281,7 +265,11 @@ def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str
             behind[by].append(part)
     for line in drawn.lines:
         if (near := behind[line.token]) and line.token not in parts:
-            start, end = (parts[box.token] for box in (line.start, line.end))
+            # The ends outside are no parts.
+            boxes = (line.start, line.end)
+            start, end = (
+                parts.get(box.token, {'id': box.name, 'name': box.name}) for box in boxes
+            )
             id_, name = f'lines:{start["id"]}>{end["id"]}', f'{start["name"]} to {end["name"]}'
             yield line.token, _part(id_, 'connections', name, line.details, near)
 

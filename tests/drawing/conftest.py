@@ -11,11 +11,11 @@ from composer.language.pipeline import load_system
 
 
 @pytest.fixture
-def draw(tmp_path, monkeypatch):
-    """Return a function that makes a picture of the text of a file."""
+def read(tmp_path, monkeypatch):
+    """Return a function that checks the text of a file."""
     monkeypatch.chdir(tmp_path)
 
-    def draw(text, *set_values, name='robot', layer=None):
+    def read(text, *set_values, name='robot', layer=None):
         path = tmp_path / f'{name}.yaml'
         path.write_text(textwrap.dedent(text).lstrip())
         layers = [tmp_path / 'site.yaml'] if layer else []
@@ -23,9 +23,15 @@ def draw(tmp_path, monkeypatch):
             each.write_text(layer)
         system = load_system(path, layers=layers, set_values=set_values)
         context = create_context(system, InterfaceCatalogue())
-        return build_picture(context, check_in_context(system, context))
+        return context, check_in_context(system, context)
 
-    return draw
+    return read
+
+
+@pytest.fixture
+def draw(read):
+    """Return a function that makes a picture of the text of a file."""
+    return lambda *given, **options: build_picture(*read(*given, **options))
 
 
 @pytest.fixture

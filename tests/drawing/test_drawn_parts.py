@@ -33,8 +33,8 @@ SYSTEM = f"""
 
 
 @pytest.fixture
-def data(draw, needs_graphviz):
-    return as_json(Drawing(draw(SYSTEM)).fold(()))
+def data(read, needs_graphviz):
+    return as_json(Drawing(*read(SYSTEM)).fold(()))
 
 
 def as_json(data):
@@ -109,7 +109,7 @@ def test_findings_know_what_they_are_about(data):
     assert data['parts']['e1']['findings'] == [index]
 
 
-def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
+def test_two_hundred_nodes_are_drawn(read, needs_graphviz):
     text = """
         version: 1
         nodes:
@@ -119,13 +119,13 @@ def test_two_hundred_nodes_are_drawn(draw, needs_graphviz):
             publishers: {"out_{{ i }}": std_msgs/msg/String}
             subscriptions: {in: {topic: "out_{{ (i + 3) % 10 }}", type: std_msgs/msg/String, publish: "out_{{ i }}"}}
     """
-    ids = ids_of(Drawing(draw(text)).fold(()))
+    ids = ids_of(Drawing(*read(text)).fold(()))
     assert sum(bool(re.fullmatch(r'n\d+', each)) for each in ids if each) == 200
     assert sum(bool(re.fullmatch(r'c\d+', each)) for each in ids if each) == 200
     assert not any(re.fullmatch(r'e\d+', each) for each in ids if each)
 
 
-def test_many_nodes_are_drawn_with_their_names_alone(draw, needs_graphviz):
+def test_many_nodes_are_drawn_with_their_names_alone(read, needs_graphviz):
     text = """
         version: 1
         nodes:
@@ -135,7 +135,7 @@ def test_many_nodes_are_drawn_with_their_names_alone(draw, needs_graphviz):
             subscriptions: {in: {topic: "out_{{ (i + 3) %% 10 }}", type: std_msgs/msg/String, publish: "out_{{ i }}"}}
     """
     for size, is_shown in ((10, True), (20, False)):
-        drawing = Drawing(draw(text % size)).fold(())
+        drawing = Drawing(*read(text % size)).fold(())
         document = ET.fromstring(drawing['svg'])
         texts = {each.text for each in document.iter('{http://www.w3.org/2000/svg}text')}
         assert {'n_3', '/all', '/out_3'} <= texts
@@ -162,8 +162,8 @@ FOLDABLE = """
     ],
     ids=str,
 )
-def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, boxes, lines):
-    data = as_json(Drawing(draw(FOLDABLE)).fold(folded))
+def test_a_folded_box_stands_for_what_is_in_it(read, needs_graphviz, folded, boxes, lines):
+    data = as_json(Drawing(*read(FOLDABLE)).fold(folded))
     parts, drawn = data['parts'], ids_of(data)
     shown = {token: data['stands_in'].get(token, token) for token in parts}
     assert set(shown.values()) <= drawn
@@ -176,3 +176,17 @@ def test_a_folded_box_stands_for_what_is_in_it(draw, needs_graphviz, folded, box
             if token[0] == 'e':
                 inside = [end in box['members'] for end in parts[token]['near']]
                 assert (token in box['near']) == (sum(inside) == 1)
+
+
+def test_the_lines_of_a_folded_box_to_the_outside_are_one(read, needs_graphviz):
+    text = """
+        version: 1
+        nodes:
+          talker:
+            namespace: /a
+            publishers: {one: &type {type: std_msgs/msg/String, external: true}, two: *type}
+    """
+    parts = Drawing(*read(text)).fold(['box:/a'])['parts']
+    (line,) = (part for token, part in parts.items() if token[0] == 'm')
+    assert line['name'] == '/a to external subscriptions'
+    assert line['facts'] == ('2 publishers',)

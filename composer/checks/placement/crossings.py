@@ -68,12 +68,9 @@ def find_crossings(topology: Topology, hosts: Collection[str] = ()) -> Iterator[
             that is an error of its own.
     """
     for channel in topology.channels.values():
-        senders, receivers = (
-            [each for each in ends if not hosts or place_of(each)[0] in ('', *hosts)]
-            for ends in (channel.providers, channel.users)
-        )
-        if channel.kind != 'topic':
-            senders, receivers = receivers, senders
+        ends = [end for end in channel.ends if not hosts or place_of(end)[0] in ('', *hosts)]
+        senders = [end for end in ends if end.kind.sends]
+        receivers = [end for end in ends if not end.kind.sends]
         from_here = tuple(_list_crossing(senders, receivers))
         if from_here:
             yield Crossing(channel, from_here, tuple(_list_crossing(receivers, senders)))
