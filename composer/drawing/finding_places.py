@@ -13,7 +13,7 @@ from composer.terminal import escape
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from composer.checks.connections.topology import Channel, Topology
+    from composer.checks.connections.topology import Topology
     from composer.diagnostics import Diagnostic, SourceFile, Span
     from composer.yaml_text.positions import DataPath, SourceMap
 
@@ -38,16 +38,16 @@ class Marks:
     ) -> None:
         self._findings = findings
         self._told: set[int] = set()
+        self._places: dict[DataPath, list[int]] = defaultdict(list)
         lines = defaultdict(list)
         for path, span in (*positions.keys.items(), *positions.values.items()):
             if path[:1] in (('nodes',), ('processes',)) and len(path) >= _NODE:
                 lines[span.source, span.line].append((span, path))
-        channels = {end.path: each for each in topology.channels.values() for end in each.ends}
-        # The keys of a dictionary, as one finding may be at a part several times.
-        self._places: dict[DataPath, dict[int, None]] = defaultdict(dict)
+        channels = {end.path: key for key, each in topology.channels.items() for end in each.ends}
         for index, finding in enumerate(findings):
-            for part in _find_parts(finding, lines, channels):
-                self._places[part][index] = None
+            # One finding may be at a part several times.
+            for part in dict.fromkeys(_find_parts(finding, lines, channels)):
+                self._places[part].append(index)
 
     def at(self, key: DataPath) -> dict[str, Any]:
         """Return `findings`, `remarks` and `mark` of a part: a message is only shown once.
@@ -73,27 +73,28 @@ class Marks:
 
 
 def _find_parts(
-    finding: Diagnostic, lines: Lines, channels: Mapping[DataPath, Channel]
+    finding: Diagnostic, lines: Lines, channels: Mapping[DataPath, tuple[str, str]]
 ) -> Iterator[DataPath]:
+    """Yield what `Marks.at` takes; `channels` are the kind and name of that of each end."""
     paths = _paths_at(finding.span, lines) if finding.span else []
-    ends = {}
-    for path in paths:
-        end = _end_of(path)
-        if end in channels and not _OF_BEHAVIOURS.intersection(path[len(end) : len(end) + 1]):
-            ends[end] = channels[end]
-    # Of several ends written in one place, those whose channel the finding names.
-    named = {end: ends[end] for end in ends if f"'{ends[end].name}'" in finding.message}
-    for end, channel in (named or ends).items():
-        yield (channel.kind, channel.name) if finding.rule in _OF_CHANNELS else end
+    ends = {
+        end: channels[end]
+        for path in paths
+        if (end := _end_of(path)) in channels
+        and _OF_BEHAVIOURS.isdisjoint(path[len(end) : len(end) + 1])
+    }
     if not ends:
         yield from (path[:_NODE] for path in paths)
+    # Of several ends written in one place, those whose channel the finding names.
+    named = {end: key for end, key in ends.items() if f"'{key[1]}'" in finding.message} or ends
+    for end, key in named.items():
+        yield key if finding.rule in _OF_CHANNELS else end
     rule = load_rule(finding.rule)
     if rule.family == 'wiring' and rule.severity is Severity.ERROR:
         # It is about the other ends that it names, too.
-        known = {id(channel) for channel in (named or ends).values()}
         for related in finding.related:
             partners = map(_end_of, _paths_at(related.span, lines))
-            yield from (end for end in partners if id(channels.get(end)) in known)
+            yield from (end for end in partners if channels.get(end) in named.values())
 
 
 def _paths_at(place: Span, lines: Lines) -> list[DataPath]:

@@ -75,7 +75,7 @@ def draw_files(paths: Sequence[Path], words: Sequence[str], set_values: Sequence
     findings = AbsentPackages().leave_out(check_in_context(system, context))
     if context is None:
         texts = [f'{each.span or each.file}: {each.message}' for each in findings]
-        raise ComposerError('; '.join(texts) or f"'{paths[0]}' cannot be read")
+        raise ComposerError('; '.join(texts))
     return Drawing(context, findings)
 
 
@@ -231,12 +231,12 @@ def _parts(
         # Of a channel, the lines of its ends.
         declared = near[:_MOST_ENDS] if isinstance(part, Box) and part.details else [part]
         lines = dict.fromkeys(lines for each in declared for lines in excerpts.of(each.path))
-        name = part.title.removeprefix(f'{kind} ')
+        about = _part(part.id, kind, part.title, part.facts, [each.token for each in near])
         yield (
             part.token,
             {
+                **about,
                 'outside': [token for each in outside for token in (each.token, each.node.token)],
-                **_part(part.id, kind, name, part.facts, [each.token for each in near]),
                 'findings': part.findings,
                 'excerpts': [each._asdict() for each in (*lines, *code.get(part.id, ()))],
             },
@@ -248,10 +248,9 @@ def _box(region: Region, drawn: Arrangement, parts: Mapping[str, Any]) -> dict[s
     members = {box.token: box.kind for box in region.all_boxes()}
     ends = dict.fromkeys(end for each in members if each in parts for end in parts[each]['near'])
     near = [end for end in ends if len(members.keys() & set(parts[end]['near'])) == 1]
-    name = region.name.removeprefix(f'{region.kind} ')
     facts = [', '.join(count_kinds(members.values()))]
     return {
-        **_part(region.id, region.kind, name, facts, near),
+        **_part(region.id, region.kind, region.name, facts, near),
         'folded': region.is_folded and region.token not in drawn.stands_in,
         'members': list(members),
     }
@@ -275,8 +274,9 @@ def _bundles(drawn: Arrangement, parts: Mapping[str, Any]) -> Iterator[tuple[str
 
 
 def _part(
-    id_: str, kind: str, name: str, facts: Sequence[str], near: Sequence[str]
+    id_: str, kind: str, title: str, facts: Sequence[str], near: Sequence[str]
 ) -> dict[str, Any]:
+    name = title.removeprefix(f'{kind} ')
     about = {'id': id_, 'kind': kind, 'name': name, 'facts': facts, 'near': near}
     return {**about, 'findings': (), 'excerpts': ()}
 

@@ -36,6 +36,7 @@ from composer.records import record
 try:
     import uvicorn
     from starlette.applications import Starlette
+    from starlette.datastructures import MutableHeaders
     from starlette.requests import Request
     from starlette.responses import (
         FileResponse,
@@ -183,14 +184,12 @@ class PageServer:
                 Route('/{name}', self._asset),
             ]
         )
-        self._socket = socket.socket()
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._socket.bind(('127.0.0.1', options.port))
             # Who opens the address at once is served once all is ready.
-            self._socket.listen(_MOST_CONNECTIONS)
+            address = ('127.0.0.1', options.port)
+            self._socket = socket.create_server(address, backlog=_MOST_CONNECTIONS)
         except OSError as error:
-            message = f'port {options.port} cannot be used: {error.strerror}'
+            message = f'port {options.port} cannot be used: {os.strerror(error.errno or 0)}'
             raise ComposerError(message, help='choose another one with --port') from error
         port = self._socket.getsockname()[1]
         # Cookies do not tell ports apart.
@@ -227,8 +226,7 @@ class PageServer:
 
         async def send_guarded(message: Message) -> None:
             if message['type'] == 'http.response.start':
-                added = [(key.encode(), value.encode()) for key, value in _HEADERS.items()]
-                message = {**message, 'headers': [*message['headers'], *added]}
+                MutableHeaders(scope=message).update(_HEADERS)
             await asyncio.wait_for(send(message), _SEND_SEC)
 
         refusal = self._refuse(Request(scope))
