@@ -176,9 +176,16 @@ def render_svg(drawn: Arrangement, direction: str = 'LR') -> str:
 
 def _lay_out(text: str) -> str:
     """Return a text in the DOT language as an SVG document."""
+    program = shutil.which('dot')
+    if not (program or importlib.util.find_spec('pygraphviz')):
+        message = 'svg and pages are laid out by Graphviz, which is not installed'
+        raise ComposerError(message, help=_MISSING_HELP)
+    # -P: import nothing from the working folder.
+    library = [sys.executable, '-P', '-c', _WITH_LIBRARY]
+    command = [program, '-Tsvg'] if program else library
     try:
         done = subprocess.run(  # noqa: S603 - the program is Graphviz, the text its input
-            _command(), input=text.encode(), capture_output=True, timeout=_LIMIT_SEC, check=False
+            command, input=text.encode(), capture_output=True, timeout=_LIMIT_SEC, check=False
         )
     except subprocess.TimeoutExpired as error:
         message = f'Graphviz found no layout in {_LIMIT_SEC:g} s'
@@ -192,14 +199,3 @@ def _lay_out(text: str) -> str:
         message = f'Graphviz failed with code {done.returncode}: {said}'
         raise ComposerError(message)
     return svg
-
-
-def _command() -> list[str]:
-    program = shutil.which('dot')
-    if program:
-        return [program, '-Tsvg']
-    if importlib.util.find_spec('pygraphviz'):
-        # -P: import nothing from the working folder.
-        return [sys.executable, '-P', '-c', _WITH_LIBRARY]
-    message = 'svg and pages are laid out by Graphviz, which is not installed'
-    raise ComposerError(message, help=_MISSING_HELP)

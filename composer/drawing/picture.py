@@ -340,10 +340,10 @@ def _waits(
             elif kind != 'process':
                 name = full_name(waiter, kind, name)
             waits.append((boxes.get(f'{kind}:{name}'), at[waiter.path], condition.path))
-    for component in context.spec.components:
-        # It is drawn at its container.
-        container = boxes[f'process:{component.container}']
-        waits.append((container, at[component.path], component.path))
+    waits += [
+        (boxes[f'process:{component.container}'], at[component.path], component.path)
+        for component in context.spec.components
+    ]
     waits += [
         (at[process.path], boxes.get(f'process:{action.start}'), action.path)
         for process in context.spec.processes.values()
