@@ -390,12 +390,18 @@ def test_what_timers_are_to_do_is_read_from_the_file(tmp_path):
               later: {period: 0.5, behaviour: 'parts:later'}
               steps: {period: 0.5, behaviour: 'parts:steps'}
               by: {rate: {parameter: hz}, behaviour: 'parts:plain'}
+              of_class: {period: 0.5, behaviour: 'parts:Counter.tick'}
     """
     code = 'def plain(node):\n    pass\n\nasync def later(node):\n    pass\n\ndef steps(node):\n    yield\n'
+    code += '\nclass Counter:\n    def tick(self):\n        pass\n'
     (tmp_path / 'system.yaml').write_text(textwrap.dedent(text))
     (tmp_path / 'parts.py').write_text(code)
     drawing = draw_files([tmp_path / 'system.yaml'], [], [])
-    assert drawing.rates == {'timer:/n:fixed': 4.0, 'timer:/n:plain': 2.0}
+    plain = dict.fromkeys(('timer:/n:plain', 'timer:/n:of_class'), 2.0)
+    assert drawing.rates == {'timer:/n:fixed': 4.0, **plain}
+    *_, method = drawing.fold()['parts']['n0']['excerpts']
+    assert (method['first'], method['what']) == (11, "timer 'of_class'")
+    assert method['lines'] == ('    def tick(self):', '        pass')
 
 
 @pytest.mark.parametrize(
