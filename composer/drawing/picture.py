@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import field, fields, replace
 from itertools import count
 from posixpath import commonpath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -38,8 +38,8 @@ Side: TypeAlias = Literal['providers', 'users']
 
 # Policies whose values are clear without their names.
 _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
-# What quotes the file; messages of findings hide values themselves.
-_QUOTING = ('id', 'name', 'details', 'namespace', 'description', 'type', 'start', 'end')
+# What quotes nothing; messages of findings hide values themselves.
+_NEVER_HIDDEN = 'token kind role path findings remarks mark external place'.split()
 
 
 @record
@@ -208,7 +208,7 @@ def _concealed(value: Any, shown: dict[str, str]) -> Any:
     if isinstance(value, tuple):
         return tuple(_concealed(each, shown) for each in value)
     if isinstance(value, Part):
-        names = (name for name in _QUOTING if hasattr(value, name))
+        names = (each.name for each in fields(value) if each.name not in _NEVER_HIDDEN)
         return replace(value, **{name: _concealed(getattr(value, name), shown) for name in names})
     return value
 
