@@ -11,7 +11,8 @@ from functools import partial
 from time import time_ns
 from typing import TYPE_CHECKING, Any, Final
 
-from composer.recordings.cdr import serializer_of
+from rclpy.serialization import serialize_message
+
 from composer.recordings.graph_recorder import GraphRecorder, read_offer
 from composer.recordings.recorder import Recorder
 from composer.recordings.recording_place import find_place
@@ -132,29 +133,24 @@ class SystemRecorder:
         own.publishers.add(identify_publisher(ros))
         offers = [read_offer(ros.qos_profile)]
         channel = self.sink.open_channel(topic, ros.msg_type, offers)
-        return create_tap(self.sink, channel, ros.msg_type, self._report)
+        return create_tap(self.sink, channel, self._report)
 
 
-def create_tap(
-    recorder: Sink,
-    channel: Channel,
-    message_class: type,
-    report: Callable[[str], object],
-) -> Tap:
+def create_tap(recorder: Sink, channel: Channel, report: Callable[[str], object]) -> Tap:
     """Return what records a message of a publisher, in the thread that publishes it."""
-    queue, append, serialize = recorder.queue, recorder.queue.append, serializer_of(message_class)
+    queue = recorder.queue
 
     def tap(message: Any) -> None:
         if len(queue) >= recorder.room:
             recorder.lost += 1
             return
         try:
-            data = serialize(message)
+            data = serialize_message(message)
         except Exception as error:  # noqa: BLE001 - whoever publishes it is told by rclpy
             report(f"a message of '{channel.topic}' is left out: {error}")
             return
         now_ns = time_ns()
-        append((channel, now_ns, now_ns, data))
+        queue.append((channel, now_ns, now_ns, data))
 
     return tap
 
