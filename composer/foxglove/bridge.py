@@ -6,13 +6,11 @@ Messages are taken as a recording takes them: see `SystemRecorder`.
 from __future__ import annotations
 
 import json
-import os
-import queue
 import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
-from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 
 import foxglove
@@ -47,13 +45,9 @@ _BURST_SEC: Final = 0.03
 _ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
-# A client that takes nothing for so long is disconnected.
-_STALL_MS: Final = 5000
 _HIDDEN: Final = '/_'
 _LISTENER: Final = '_composer_foxglove_listener'
 _PROTOCOL: Final = 'foxglove.sdk.v1'
-_ANY: Final = ('0.0.0.0', '::', '')  # noqa: S104 - how each address is written
-_LOOPBACK: Final = 'localhost'
 
 
 @record
@@ -86,18 +80,16 @@ class FoxgloveBridge(GraphAccess):
         super().__init__(allows_changes=options.allows_changes)
         self.queue: deque[Any] = deque()
         self._log = log
-        self._address = _LOOPBACK if options.address in _ANY else options.address
+        self._address = options.address
         self._sink = foxglove.Context()
         self._channels: dict[tuple[str, str], _Channel] = {}
         self._services: set[str] = set()
         self._wanted: Counter[str] = Counter()
         self._warned: set[str] = set()
-        self._watches_graph = threading.Event()
         self._may_show_graph = threading.Event()
-        # What the threads of the server tell; they may hold its locks.
-        self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
+        # The topics that the threads of the server tell of; they may hold its locks.
+        self._changed: deque[str] = deque()
         self._ended = threading.Event()
-        self._is_wanted = threading.Event()
         changing = [Capability.ClientPublish, Capability.Services]
         reading = [Capability.ConnectionGraph, Capability.Parameters]
         try:
@@ -114,11 +106,9 @@ class FoxgloveBridge(GraphAccess):
         except (OSError, RuntimeError, ValueError) as error:
             message = f'Foxglove cannot be served at {options.address}:{options.port}: {error}'
             raise StartError(message, help='--foxglove 0 takes any port that is free') from error
-        _limit_stalls(self._server.port)
         log.info(f'Foxglove: open ws://{options.address}:{self._server.port}')
         self._recorder = SystemRecorder(self, self, self._warn_once, _LISTENER, is_late=True)
         self._thread = threading.Thread(target=self._run, name='composer-foxglove', daemon=True)
-        self._sender = threading.Thread(target=self._send, name='composer-sender', daemon=True)
 
     def start(self, context: Context, topics: LocalTopics | None = None) -> None:
         """Begin.
@@ -132,21 +122,38 @@ class FoxgloveBridge(GraphAccess):
         self._executor.start()
         self._recorder.start(context, topics)
         self._thread.start()
-        self._sender.start()
 
     def stop(self) -> None:
         """End; do nothing the second time, or if it never began."""
         if self._ended.is_set():
             return
         self._ended.set()
-        self._told.put('')
-        self._is_wanted.set()
         if self._thread.ident is not None:
             self._thread.join(_STOP_SEC)
             self._recorder.stop()
             self._executor.stop(_STOP_SEC)
             self._node.destroy_node()
         self._server.stop()
+
+    def _run(self) -> None:
+        """Send what comes in bursts: to wake a thread for each message costs far more."""
+        next_look = 0.0
+        while not self._ended.wait(_BURST_SEC):
+            self._try(self._send)
+            while self._changed:
+                self._try(self._recorder.follow, self._changed.popleft())
+            if monotonic() >= next_look:
+                self._try(self._look)
+                next_look = monotonic() + _LOOK_SEC
+
+    def _try(self, act: Callable[..., object], *arguments: Any) -> None:
+        try:
+            act(*arguments)
+        except InvalidHandle:
+            # A behaviour may have shut down what all use; the system ends then.
+            pass
+        except Exception as error:  # noqa: BLE001 - the bridge goes on with all others
+            self._warn_once(f'not all is shown to Foxglove: {error}')
 
     def _warn_once(self, text: str) -> None:
         # Each message of a topic may have an error of its own.
@@ -158,17 +165,10 @@ class FoxgloveBridge(GraphAccess):
     # As a recorder, and as its patterns
 
     def _send(self) -> None:
-        """Send what comes in bursts: to wake a thread for each message costs far more."""
-        entries = self.queue
-        while not self._ended.wait(_BURST_SEC):
-            # What came as the last one left is nothing for the next one.
-            self._is_wanted.wait(_LOOK_SEC)
-            for _ in range(len(entries)):
-                channel, _, published_ns, data = entries.popleft()
-                try:
-                    channel.base.log(data, log_time=published_ns)
-                except Exception as error:  # noqa: BLE001 - a message costs no more than itself
-                    self._warn_once(f"a message of '{channel.topic}' is left out: {error}")
+        for _ in range(len(self.queue)):
+            channel, _, published_ns, data = self.queue.popleft()
+            # The clock of a publisher may be before 1970.
+            channel.base.log(data, log_time=max(0, published_ns))
 
     def has(self, topic: str) -> bool:
         """Return whether a client subscribes to a topic."""
@@ -195,22 +195,6 @@ class FoxgloveBridge(GraphAccess):
         return []
 
     # The graph
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            self._try(self._look)
-            with suppress(queue.Empty):
-                if topic := self._told.get(timeout=_LOOK_SEC):
-                    self._try(self._recorder.follow, topic)
-
-    def _try(self, act: Callable[..., object], *arguments: Any) -> None:
-        try:
-            act(*arguments)
-        except InvalidHandle:
-            # A behaviour may have shut down what all use; the system ends then.
-            pass
-        except Exception as error:  # noqa: BLE001 - the bridge goes on with all others
-            self._warn_once(f'not all is shown to Foxglove: {error}')
 
     def _look(self) -> None:
         """Show topics and services that have come, and no more those that have gone."""
@@ -253,25 +237,20 @@ class FoxgloveBridge(GraphAccess):
     def on_subscribe(self, _client: Client, channel: ChannelView) -> None:
         """Have the topic listened to; anew, if it is, as a latched message is then sent again."""
         self._wanted[channel.topic] += 1
-        self._is_wanted.set()
-        self._told.put(channel.topic)
+        self._changed.append(channel.topic)
 
     def on_unsubscribe(self, _client: Client, channel: ChannelView) -> None:
         """Listen no more, if this was the last one."""
         self._wanted[channel.topic] -= 1
         if not self._wanted[channel.topic]:
-            self._told.put(channel.topic)
-        if not self._wanted.total():
-            self._is_wanted.clear()
+            self._changed.append(channel.topic)
 
     def on_connection_graph_subscribe(self) -> None:
         """Show the graph, soon and when it changes."""
-        if not self._watches_graph.is_set():
-            self._watches_graph.set()
-            threading.Thread(target=self._watch_graph, name='composer-graph', daemon=True).start()
+        threading.Thread(target=self._watch_graph, name='composer-graph', daemon=True).start()
 
     def _watch_graph(self) -> None:
-        """Subscribe to the graph as a client, and let it be shown for as long.
+        """Subscribe to the graph as a client until the end.
 
         The server tells of the first subscription and of the end of the last one with a lock held,
         for which the publication of the graph waits with the interpreter held: for ever, if both
@@ -283,7 +262,6 @@ class FoxgloveBridge(GraphAccess):
                 'ws://localhost',
                 sock=socket.create_connection((self._address, self._server.port)),
                 subprotocols=[Subprotocol(_PROTOCOL)],
-                compression=None,
                 max_size=None,
             ) as connection,
         ):
@@ -292,22 +270,3 @@ class FoxgloveBridge(GraphAccess):
                 if isinstance(message, str) and '"connectionGraphUpdate"' in message:
                     self._may_show_graph.set()
         self._may_show_graph.clear()
-        self._watches_graph.clear()
-
-
-def _limit_stalls(port: int) -> None:
-    """Have the kernel end connections to clients that take nothing: the SDK would keep them.
-
-    Connections inherit the limit from the socket that listens.
-
-    Source: TCP_USER_TIMEOUT in https://man7.org/linux/man-pages/man7/tcp.7.html
-    """
-    for path in Path('/proc/self/fd').iterdir():
-        with suppress(OSError):
-            if not path.is_socket():
-                continue
-            with socket.socket(fileno=os.dup(int(path.name))) as found:
-                is_tcp = found.family in (socket.AF_INET, socket.AF_INET6)
-                listens = found.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
-                if is_tcp and listens and found.getsockname()[1] == port:
-                    found.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections import defaultdict
 from contextlib import suppress
 from functools import partial
-from time import monotonic
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
 from foxglove.websocket import (
@@ -18,27 +17,26 @@ from foxglove.websocket import (
     ServiceSchema,
     StatusLevel,
 )
-from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.exceptions import InvalidServiceNameException
 from rclpy.node import NodeNameNonExistentError
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 from rclpy.serialization import deserialize_message, serialize_message
 
-from composer.errors import CallTimeoutError
+from composer.errors import CallTimeoutError, ComposerError
 from composer.interfaces.classes import import_interface
 from composer.names import join_names
 from composer.recordings.definitions import import_message
-from composer.runtime.messages.payload_texts import fit_value
+from composer.runtime.messages.payload_texts import create_parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from foxglove.websocket import Client, ClientChannel, ServiceRequest, WebSocketServer
     from rclpy.node import Node
 
 _ANSWER_SEC: Final = 5.0
+_POLL_SEC: Final = 0.01
 _LIST: Final = '/list_parameters'
 
 
@@ -55,32 +53,27 @@ class GraphAccess(ServerListener):
     def __init__(self, *, allows_changes: bool) -> None:
         self._allows_changes = allows_changes
         self._publishers: dict[tuple[int, int], Any] = {}
-        self._graph: Any = None
 
     def refuse(self, reason: str) -> None:
         """Show clients why something is not done."""
         self._server.publish_status(reason, StatusLevel.Warning)
 
     def show_graph(self, topics: Iterable[str]) -> None:
-        """Show clients who publishes, hears and serves what, if that is new."""
-        node, servers = self._node, defaultdict[str, list[str]](list)
+        """Show clients who publishes, hears and serves what."""
+        node, graph = self._node, ConnectionGraph()
+        for topic in topics:
+            graph.set_published_topic(topic, _nodes_of(node.get_publishers_info_by_topic(topic)))
+            heard = _nodes_of(node.get_subscriptions_info_by_topic(topic))
+            graph.set_subscribed_topic(topic, heard)
+        servers = defaultdict[str, list[str]](list)
         for name, namespace in node.get_node_names_and_namespaces():
             # It may have gone meanwhile.
             with suppress(NodeNameNonExistentError):
                 for service, _ in node.get_service_names_and_types_by_node(name, namespace):
-                    if '/_' not in service:
-                        servers[service].append(join_names(namespace, name))
-        published = {each: _nodes_of(node.get_publishers_info_by_topic(each)) for each in topics}
-        heard = {each: _nodes_of(node.get_subscriptions_info_by_topic(each)) for each in topics}
-        if self._graph == (published, heard, servers):
-            return
-        self._graph, graph = (published, heard, servers), ConnectionGraph()
-        for topic, nodes in published.items():
-            graph.set_published_topic(topic, nodes)
-        for topic, nodes in heard.items():
-            graph.set_subscribed_topic(topic, nodes)
+                    servers[service].append(join_names(namespace, name))
         for service, nodes in servers.items():
-            graph.set_advertised_service(service, nodes)
+            if '/_' not in service:
+                graph.set_advertised_service(service, nodes)
         self._server.publish_connection_graph(graph)
 
     def _call_all(self, calls: Sequence[tuple[Any, str, Any]]) -> list[Any]:
@@ -89,45 +82,36 @@ class GraphAccess(ServerListener):
         Args:
             calls: The class of each service, its name, and the request.
         """
-        clients: dict[str, Any] = {}
-        futures: list[Any] = []
-        responses = []
+        known = {name for name, _ in self._node.get_service_names_and_types()}
+        classes = {name: service_class for service_class, name, _ in calls if name in known}
+        clients = {
+            name: self._node.create_client(service_class, name)
+            for name, service_class in classes.items()
+        }
         deadline = monotonic() + _ANSWER_SEC
         try:
-            for service_class, name, _ in calls:
-                # There is no service of a wrong name.
-                with suppress(InvalidServiceNameException):
-                    if name not in clients:
-                        clients[name] = self._node.create_client(service_class, name)
-            for _, name, request in calls:
-                client, left_sec = clients.get(name), max(0.0, deadline - monotonic())
-                if client is not None and client.wait_for_service(left_sec):
-                    futures.append(client.call_async(request))
-                else:
-                    futures.append(None)
-            for future in futures:
-                done = threading.Event()
-                if future is not None:
-                    future.add_done_callback(lambda _, done=done: done.set())
-                    done.wait(max(0.0, deadline - monotonic()))
-                is_done = future is not None and future.done()
-                responses.append(future.result() if is_done else None)
+            futures = [
+                clients[name].call_async(request)
+                if name in clients and clients[name].wait_for_service(deadline - monotonic())
+                else None
+                for _, name, request in calls
+            ]
+            while not all(each is None or each.done() for each in futures):
+                if monotonic() > deadline:
+                    break
+                sleep(_POLL_SEC)
+            return [each.result() if each and each.done() else None for each in futures]
         finally:
             # The graph would have the services of nodes that have gone as long as the clients.
             for client in clients.values():
                 self._node.destroy_client(client)
-        return responses
 
     def on_get_parameters(
-        self, _client: Client, param_names: list[str], request_id: str | None = None
+        self, _client: Client, param_names: list[str], _request_id: str | None = None
     ) -> list[Parameter]:
         """Return parameters by their names, as in `/arm.speed`; all if there are none."""
-        del request_id
-        return self._read_parameters(param_names or self._list_parameters())
-
-    def _read_parameters(self, names: Iterable[str]) -> list[Parameter]:
-        values = self._read(names)
-        return [each for name, value in values.items() for each in _show(name, value)]
+        values = self._read(param_names or self._list_parameters())
+        return [Parameter(name, value=_to_native(value)) for name, value in values.items()]
 
     def _list_parameters(self) -> list[str]:
         services = [name for name, _ in self._node.get_service_names_and_types()]
@@ -136,46 +120,44 @@ class GraphAccess(ServerListener):
         answers = zip(nodes, self._call_all(calls), strict=True)
         return [f'{node}.{name}' for node, each in answers if each for name in each.result.names]
 
-    def _read(self, names: Iterable[str]) -> dict[str, Any]:
+    def _read(self, names: Sequence[str]) -> dict[str, ParameterValue]:
+        """Return the values of those that are set."""
         # A node that does not have one of several answers nothing.
         parts = [name.partition('.') for name in names]
         calls = [
             (GetParameters, f'{node}/get_parameters', GetParameters.Request(names=[name]))
             for node, _, name in parts
         ]
-        answers = zip(parts, self._call_all(calls), strict=True)
-        return {
-            f'{node}.{name}': response.values[0]
-            for (node, _, name), response in answers
-            if response is not None and response.values
-        }
+        answers = zip(names, self._call_all(calls), strict=True)
+        values = {name: each.values[0] for name, each in answers if each and each.values}
+        return {name: value for name, value in values.items() if value.type}
 
     def on_set_parameters(
-        self, _client: Client, parameters: Sequence[Parameter], request_id: str | None = None
+        self, client: Client, parameters: Sequence[Parameter], _request_id: str | None = None
     ) -> list[Parameter]:
         """Set parameters, and return what they are then; tell clients which are refused."""
-        del request_id
         names = [each.name for each in parameters]
-        if not self._allows_changes:
+        if self._allows_changes:
+            self._set(parameters, self._read(names))
+        else:
             self.refuse('parameters are set only with --allow-changes')
-            return self._read_parameters(names)
-        types = {name: value.type for name, value in self._read(names).items()}
+        return self.on_get_parameters(client, names)
+
+    def _set(self, parameters: Iterable[Parameter], known: Mapping[str, ParameterValue]) -> None:
         calls = []
         for parameter in parameters:
             # Only parameters may have dots.
             node, _, name = parameter.name.partition('.')
+            value: Any = parameter.get_value()
+            if isinstance(value, bytes):
+                value = [bytes([each]) for each in value]
+            old = known.get(parameter.name, ParameterValue())
             try:
-                value: Any = parameter.get_value()
-                if isinstance(value, bytes):
-                    value = [bytes([each]) for each in value]
-                value = fit_value(
-                    value, types.get(parameter.name, ParameterType.PARAMETER_NOT_SET)
-                )
-                ros = RosParameter(name, value=value).to_parameter_msg()
-            except (AttributeError, TypeError, ValueError):
-                self.refuse(f'{parameter.name} was not set: it has no type of ROS')
+                new = create_parameter(name, value, old.type)
+            except ComposerError as error:
+                self.refuse(f'{parameter.name} was not set: {error}')
                 continue
-            request = SetParameters.Request(parameters=[ros])
+            request = SetParameters.Request(parameters=[new])
             calls.append((SetParameters, f'{node}/set_parameters', request))
         for (_, service, request), response in zip(calls, self._call_all(calls), strict=True):
             node = service.removesuffix('/set_parameters')
@@ -184,7 +166,6 @@ class GraphAccess(ServerListener):
             elif not response.results[0].successful:
                 name, reason = request.parameters[0].name, response.results[0].reason
                 self.refuse(f'{node}.{name} was not set: {reason}')
-        return self._read_parameters(names)
 
     def create_service(
         self, name: str, type_name: str, create_schema: Callable[[type], Any]
@@ -237,11 +218,7 @@ def _nodes_of(ends: Iterable[Any]) -> list[str]:
     return sorted(node for node in nodes if '/_' not in node)
 
 
-def _show(name: str, value: Any) -> Iterator[Parameter]:
+def _to_native(value: ParameterValue) -> Any:
+    """Return a value as the SDK takes it: bytes are one value there."""
     native = parameter_value_to_python(value)
-    if value.type == ParameterType.PARAMETER_BYTE_ARRAY:
-        native = b''.join(native)
-    elif not isinstance(native, bool | int | float | str | None):
-        native = list(native)
-    if native is not None:
-        yield Parameter(name, value=native)
+    return b''.join(native) if value.type == ParameterType.PARAMETER_BYTE_ARRAY else native

@@ -1,12 +1,10 @@
 """Foxglove's protocol, spoken by a client of its own to a system that runs."""
 
 import json
-import logging
 import re
-import socket
 import struct
 import time
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager
 
 import pytest
 
@@ -20,8 +18,6 @@ from std_srvs.srv import SetBool
 from websockets.sync.client import connect
 
 from composer.cli.main import run
-from composer.foxglove import BridgeOptions
-from composer.foxglove.bridge import FoxgloveBridge
 from tests.running import Peer, wait_for
 
 pytestmark = pytest.mark.ros
@@ -166,14 +162,6 @@ def connected(port, **options):
         yield Foxglove(socket)
 
 
-def is_connected(client):
-    """Return whether the kernel still has a connection: TCP_CLOSE is 7."""
-    # The library closes it once it has noticed its end.
-    with suppress(OSError):
-        return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 7
-    return False
-
-
 def port_of(system):
     return int(re.search(r'ws://127\.0\.0\.1:(\d+)', system.output)[1])
 
@@ -240,30 +228,10 @@ def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(port, peer, ca
         wait_for(lambda: not sender.get_subscription_count(), 'the end of the subscription')
 
 
-def test_a_message_that_cannot_be_sent_costs_no_other_one(context, node, caplog):
-    caplog.set_level(logging.INFO)
-    bridge = FoxgloveBridge(BridgeOptions(0, '127.0.0.1', False), 'robot', logging.getLogger())
+def test_who_does_not_read_holds_nobody_up(port):
     with ExitStack() as stack:
-        stack.callback(bridge.stop)
-        node.create_publisher(Int64, '/time', 1)
-        bridge.start(context)
-        one = stack.enter_context(connected(int(caplog.messages[0].rpartition(':')[2])))
-        one.subscribe('/time', 1)
-        wait_for(lambda: bridge.has('/time'), 'the subscription')
-        channel = bridge.open_channel('/time', Int64)
-        # The clock of a publisher may be before 1970.
-        for stamp_ns in (-1, -2, 1, 2):
-            bridge.queue.append((channel, 0, stamp_ns, serialize_message(Int64(data=stamp_ns))))
-        assert [message.data for message in one.messages(1, Int64, 2)] == [1, 2]
-    [warning] = [each.message for each in caplog.records if each.levelname == 'WARNING']
-    assert warning.startswith("a message of '/time' is left out: ")
-
-
-def test_who_does_not_read_holds_nobody_up_and_is_disconnected(port):
-    with ExitStack() as stack:
-        # It takes nothing more from the kernel than fits its queue, and only its pings find out.
-        pings = {'ping_interval': 0.2, 'ping_timeout': None}
-        mute = stack.enter_context(connected(port, max_queue=1, **pings))
+        # It takes nothing more from the kernel than fits its queue.
+        mute = stack.enter_context(connected(port, max_queue=1, ping_interval=None))
         mute.subscribe('/count', 1)
         mute.subscribe('/big', 2)
         reader = stack.enter_context(connected(port))
@@ -274,8 +242,6 @@ def test_who_does_not_read_holds_nobody_up_and_is_disconnected(port):
                     one.subscribe('/count', 1)
         numbers = [message.data for message in reader.messages(1, Int64, count=100)]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-        wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
-        assert is_connected(reader.socket.socket)
 
 
 def test_a_system_is_shown_from_beside_it_where_clients_change_and_keep_nothing(
@@ -332,7 +298,9 @@ def test_clients_change_the_system_where_they_may(system, port):
         one.seen.clear()
         one.send('setParameters', parameters=[{'name': '/talker.mode', 'value': {'a': 1}}])
         refusal = one.wait_for_op('status')
-        assert refusal['message'] == '/talker.mode was not set: it has no type of ROS'
+        assert (
+            refusal['message'] == "/talker.mode was not set: {'a': 1} is no value of a parameter"
+        )
         one.seen.clear()
         one.send('subscribeParameterUpdates', parameterNames=['/talker.mode'])
         new = {'/talker.speed': 3, '/talker.gains': [4], '/talker.mode': 'fast', '/talker.no': 1}

@@ -34,19 +34,28 @@ def read_parameter(name: str, text: str, parameter_type: int) -> Parameter:
         parameter_type: Its type, as in `rcl_interfaces/msg/ParameterType`.
 
     Raises:
+        UsageError: It is no YAML.
+        ComposerError: It is no value of a parameter.
+    """
+    return create_parameter(name, _parse(text), parameter_type)
+
+
+def create_parameter(name: str, value: Any, parameter_type: int) -> Parameter:
+    """Return a parameter; where its type has floats, the value may have whole numbers.
+
+    Raises:
         ComposerError: It is no value of a parameter.
     """
     from rclpy.parameter import Parameter
 
     try:
-        return Parameter(name, value=fit_value(_parse(text), parameter_type)).to_parameter_msg()
-    except (TypeError, ValueError, AssertionError):
-        message = f'{text} is no value of a parameter'
+        return Parameter(name, value=_fit(value, parameter_type)).to_parameter_msg()
+    except (AttributeError, TypeError, ValueError, AssertionError):
+        message = f'{value} is no value of a parameter'
         raise ComposerError(message) from None
 
 
-def fit_value(value: Any, parameter_type: int) -> Any:
-    """Return a value as a parameter of this type takes it: whole numbers may be floats."""
+def _fit(value: Any, parameter_type: int) -> Any:
     if parameter_type == _DOUBLE and type(value) is int:
         return float(value)
     if parameter_type == _DOUBLES and isinstance(value, list):
