@@ -131,17 +131,15 @@ class Requests:
         begun, losses = monotonic(), self.losses
         if not self.waits.until_true(self._has_server, timeout_sec, self.notice):
             raise self.unavailable(timeout_sec or 0.0)
-        traced = tracer.begin() if tracer.is_on else None
-        future = self._begin(send, losses)
-        try:
-            if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
-                raise self.unanswered(timeout_sec or 0.0)
-        finally:
-            self.waiting.discard(future)
-            if not future.done():
-                self.forget(future)
-            if traced is not None:
-                tracer.end('call', self.waits.node, self.notice.what, traced)
+        with tracer.noting('call', self.waits.node, self.notice.what):
+            future = self._begin(send, losses)
+            try:
+                if not self.waits.until_done(future, _remaining(timeout_sec, begun)):
+                    raise self.unanswered(timeout_sec or 0.0)
+            finally:
+                self.waiting.discard(future)
+                if not future.done():
+                    self.forget(future)
         return future.result()
 
     async def send_async(self, send: Callable[[], Future], timeout_sec: float | None) -> Any:
@@ -153,17 +151,15 @@ class Requests:
             has_server, timeout_sec, self.notice
         ):
             raise self.unavailable(timeout_sec or 0.0)
-        traced = tracer.begin() if tracer.is_on else None
-        future = self._begin(send, losses)
-        try:
-            if not await self.waits.until_answered_async(future, _remaining(timeout_sec, begun)):
-                raise self.unanswered(timeout_sec or 0.0)
-        finally:
-            self.waiting.discard(future)
-            if not future.done():
-                self.forget(future)
-            if traced is not None:
-                tracer.end('call', self.waits.node, self.notice.what, traced, COROUTINE)
+        with tracer.noting('call', self.waits.node, self.notice.what, COROUTINE):
+            future = self._begin(send, losses)
+            try:
+                if not await waits.until_answered_async(future, _remaining(timeout_sec, begun)):
+                    raise self.unanswered(timeout_sec or 0.0)
+            finally:
+                self.waiting.discard(future)
+                if not future.done():
+                    self.forget(future)
         return future.result()
 
     def _has_server(self) -> bool:

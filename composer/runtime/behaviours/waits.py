@@ -191,7 +191,7 @@ class Waits:
         if condition():
             return True
         begun = monotonic()
-        with self.make_room(), tracer.waiting(self.node, notice.what):
+        with self.make_room(), tracer.noting('wait', self.node, notice.what):
             while not condition():
                 if self._is_refused():
                     raise stopping_error()
@@ -208,7 +208,7 @@ class Waits:
         if condition():
             return True
         begun = monotonic()
-        with tracer.waiting(self.node, notice.what, COROUTINE):
+        with tracer.noting('wait', self.node, notice.what, COROUTINE):
             while not condition():
                 if self._is_refused():
                     raise stopping_error()

@@ -222,20 +222,18 @@ class _Execution:
     async def execute(self, goal: Any) -> Any:
         """Return the result of a goal, which has its final state then."""
         result = FAILED
-        traced = tracer.begin() if tracer.is_on else None
         try:
-            if not self._end_early(goal):
-                progress = Progress()
-                result = await self._call.with_progress(progress).complete(goal, progress)
-            if goal.is_active:
-                # Its behaviour raised.
-                goal.abort()
-            result = self._result_class() if result is FAILED else result
-            self._tell_result(goal, result)
-            return result
+            with tracer.noting('goal', self._node_name, self._name, COROUTINE):
+                if not self._end_early(goal):
+                    progress = Progress()
+                    result = await self._call.with_progress(progress).complete(goal, progress)
+                if goal.is_active:
+                    # Its behaviour raised.
+                    goal.abort()
+                result = self._result_class() if result is FAILED else result
+                self._tell_result(goal, result)
+                return result
         finally:
-            if traced is not None:
-                tracer.end('goal', self._node_name, self._name, traced, COROUTINE)
             self._queue.finished(goal)
 
     def tell(self, kind: EventKind, message: Any) -> None:

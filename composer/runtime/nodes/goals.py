@@ -88,7 +88,7 @@ class Goal:
             ActionNotAvailableError: The server ended, or an edit took the action client away.
             SystemStoppingError: A stop was requested while it waited.
         """
-        with tracer.waiting(self._waits.node, f"result of '{self._name}'"):
+        with tracer.noting('wait', self._waits.node, f"result of '{self._name}'"):
             is_done = self._waits.until_done(self.result_future, timeout)
         if not is_done:
             message = f"the goal of '{self._name}' did not end within {timeout:g} s"
@@ -97,6 +97,6 @@ class Goal:
 
     async def result_async(self) -> Any:
         """As `result`, without holding a thread while it waits."""
-        with tracer.waiting(self._waits.node, f"result of '{self._name}'", COROUTINE):
+        with tracer.noting('wait', self._waits.node, f"result of '{self._name}'", COROUTINE):
             await self._waits.until_done_async(self.result_future, None)
         return self.result_future.result().result

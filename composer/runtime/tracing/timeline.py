@@ -40,8 +40,7 @@ class _Slice:
     name: str
     begun_ns: int
     ended_ns: int
-    value: int
-    arrows: list[int] = field(default_factory=list)
+    value: Any
     place: dict[str, int] = field(default_factory=dict)
     cause: _Slice | None = None
     first: _Slice | None = None
@@ -60,18 +59,9 @@ class Timeline:
     def __init__(self, parts: Mapping[str, TracePart]) -> None:
         self._parts = parts
         self._begun_ns = min((part.begun_ns for part in parts.values()), default=0)
-        events = [_Slice(name, *event) for name, part in parts.items() for event in part.events]
-        self._slices = [each for each in events if each.kind != 'arrow']
-        published = {
-            (each.part, each.track, each.begun_ns): each
-            for each in self._slices
-            if each.kind == 'publish'
-        }
-        for each in events:
-            begin = published.get((each.part, each.track, each.begun_ns))
-            if each.kind == 'arrow' and begin is not None:
-                begin.arrows.append(each.value)
-                begin.ended_ns = each.ended_ns
+        self._slices = [
+            _Slice(name, *event) for name, part in parts.items() for event in part.events
+        ]
         self._slices.sort(key=lambda each: (each.begun_ns, -each.ended_ns))
         self._pids: dict[tuple[str, str], int] = {}
         self._tids: dict[tuple[int, str], int] = {}
@@ -117,7 +107,7 @@ class Timeline:
                 # Which of several coroutines it was, nobody knows.
                 if len(lasting) == 1:
                     each.cause = lasting[0]
-                    senders.update(((each.part, arrow), lasting[0]) for arrow in each.arrows)
+                    senders.update(((each.part, arrow), lasting[0]) for arrow in each.value)
 
     def render(self) -> str:
         """Return the file."""
@@ -133,9 +123,9 @@ class Timeline:
             yield {'ph': 'M', 'name': 'thread_name', 'pid': pid, 'tid': tid, 'args': args}
 
     def _render_slices(self) -> Iterator[dict[str, Any]]:
-        begun = {(each.part, arrow) for each in self._slices for arrow in each.arrows}
-        ended = {(each.part, each.value) for each in self._slices if each.kind == 'callback'}
-        numbers = {key: number for number, key in enumerate(sorted(begun & ended), 1)}
+        callbacks = [each for each in self._slices if each.kind == 'callback']
+        ends = sorted((each.part, each.value) for each in callbacks if each.value)
+        numbers = {end: number for number, end in enumerate(ends, 1)}
         for each in self._slices:
             common = {
                 'cat': each.kind,
@@ -153,11 +143,11 @@ class Timeline:
                 args = {'node': each.node}
                 yield {**common, 'ph': 'X', 'dur': duration_ns / _NS_PER_US, 'args': args}
                 # An arrow belongs to the slice before it in the file.
-                ends = [('s', arrow) for arrow in each.arrows] + [('f', each.value)]
-                for ph, arrow in ends:
+                is_begin = each.kind == 'publish'
+                for arrow in each.value if is_begin else [each.value]:
                     if number := numbers.get((each.part, arrow)):
                         named = {'cat': 'message', 'name': 'message', 'id': number}
-                        yield {**common, **named, 'ph': ph, 'bp': 'e'}
+                        yield {**common, **named, 'ph': 's' if is_begin else 'f', 'bp': 'e'}
 
     def summarize(self) -> str:
         """Return the longest callbacks, the latest timers, the waits and the longest chain."""

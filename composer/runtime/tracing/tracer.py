@@ -19,20 +19,19 @@ if TYPE_CHECKING:
     from composer.runtime.behaviours.running_calls import RunningCalls
 
 EventKind: TypeAlias = Literal[
-    'callback', 'publish', 'arrow', 'call', 'wait', 'goal', 'queue', 'dropped', 'late'
+    'callback', 'publish', 'call', 'wait', 'goal', 'queue', 'dropped', 'late'
 ]
 # Kind, node, track, name, begin and end (ns), value. A track is the identifier of a thread, or a
-# word for what holds none. The value of a callback or an arrow is the number of the arrow (0 for
-# none), of a queue its length, of a late tick by how much (ns). An arrow begins with the message
-# that its thread published at that time.
-TraceEvent: TypeAlias = 'tuple[EventKind, str, int | str, str, int, int, int]'
+# word for what holds none. The value of a message is the list of its arrows, of a callback the
+# arrow that ends there (0 for none), of a queue its length, of a late tick by how much (ns).
+TraceEvent: TypeAlias = 'list[Any]'
 
 # Less than 100 MB.
 MOST_EVENTS: Final = 500_000
 COROUTINE: Final = 'coroutine'
 MARKS: Final = 'marks'
 _FIELDS: Final = 7
-_BEGUN_NS: Final = 4
+_BEGUN_NS, _ENDED_NS, _VALUE = 4, 5, 6
 # What is noted of messages, with the queue as its node and the message's identity as its name.
 _HANDED_OVER: Final = 'handed over'
 _PUSHED_OUT: Final = 'pushed out'
@@ -63,7 +62,6 @@ class Tracer:
     Attributes:
         is_on: Whether it does.
         now_ns: Returns the time.
-        add: Notes an event.
     """
 
     def __init__(self) -> None:
@@ -76,16 +74,13 @@ class Tracer:
         # Their fields one after the other: so many tuples would keep the garbage collector busy.
         self._fields: list[Any] = []
         self._lost = 0
-        self.add = self._create_add(self._fields, MOST_EVENTS * _FIELDS)
 
-    def _create_add(self, fields: list[Any], most: int) -> Callable[[tuple[Any, ...]], None]:
-        def add(event: tuple[Any, ...]) -> None:
-            if len(fields) < most:
-                fields.extend(event)
-            else:
-                self._lost += 1
-
-        return add
+    def add(self, event: tuple[Any, ...]) -> None:
+        """Note an event."""
+        if len(self._fields) < MOST_EVENTS * _FIELDS:
+            self._fields.extend(event)
+        else:
+            self._lost += 1
 
     def turn_on(self, begun_ns: int | None = None) -> None:
         """Begin, or begin anew.
@@ -118,7 +113,7 @@ class Tracer:
                 track = COROUTINE if call.thread is None else call.thread
                 begun_ns = max(call.begun_ns, self._begun_ns)
                 name = f'{call.owner} (runs on)'
-                events.append(('callback', node, track, name, begun_ns, ended_ns, 0))
+                events.append(['callback', node, track, name, begun_ns, ended_ns, 0])
         threads = {str(each.ident): each.name for each in threading.enumerate()}
         part = TracePart(self._begun_ns, ended_ns, threads, events, self._lost)
         self._clear()
@@ -147,14 +142,14 @@ class Tracer:
             self.add((kind, node, place, name, begun_ns, self.now_ns(), message))
 
     @contextmanager
-    def waiting(self, node: str, what: str, track: str = '') -> Iterator[None]:
-        """Note that a behaviour waits for something in the block."""
+    def noting(self, kind: EventKind, node: str, name: str, track: str = '') -> Iterator[None]:
+        """Note what the block does; see `end`."""
         begun = self.begin() if self.is_on else None
         try:
             yield
         finally:
             if begun is not None:
-                self.end('wait', node, what, begun, track)
+                self.end(kind, node, name, begun, track)
 
     def note(self, kind: EventKind, node: str, name: str, value: int) -> None:
         """Note a length, or that something was dropped or late."""
@@ -174,8 +169,8 @@ class Tracer:
 def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
     """Yield events for what was noted, in the order in which it began."""
     arrows = itertools.count(1)
-    # When each thread published last.
-    publications: dict[int, int] = {}
+    # What each thread published last.
+    publications: dict[int, TraceEvent] = {}
     # What is handed over and not run yet, by the identity of the message: others may share it.
     waiting: defaultdict[int, dict[tuple[str, str], int]] = defaultdict(dict)
     lengths: dict[tuple[str, str], int] = {}
@@ -183,26 +178,26 @@ def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
         if kind == _PUSHED_OUT:
             queue = node.place
             waiting[name].pop(queue, None)
-            yield 'dropped', queue[0], MARKS, queue[1], begun_ns, begun_ns, 1
+            yield ['dropped', queue[0], MARKS, queue[1], begun_ns, begun_ns, 1]
         elif kind == _HANDED_OVER:
             queue = node.place
-            sent_ns = publications.get(track)
-            if sent_ns is not None:
+            if (publication := publications.get(track)) is not None:
                 lengths[queue] = value
                 waiting[name][queue] = arrow = next(arrows)
-                yield 'arrow', queue[0], track, queue[1], sent_ns, begun_ns, arrow
-                yield 'queue', queue[0], MARKS, queue[1], begun_ns, begun_ns, value
+                publication[_ENDED_NS] = begun_ns
+                publication[_VALUE].append(arrow)
+                yield ['queue', queue[0], MARKS, queue[1], begun_ns, begun_ns, value]
         elif kind == 'callback':
             queue = node, str(name)
-            arrow = waiting[value].pop(queue, 0) if value in waiting else 0
-            if arrow:
+            if arrow := waiting[value].pop(queue, 0):
                 lengths[queue] = max(0, lengths[queue] - 1)
-                yield 'queue', node, MARKS, queue[1], begun_ns, begun_ns, lengths[queue]
-            yield kind, node, track, queue[1], begun_ns, ended_ns, arrow
+                yield ['queue', node, MARKS, queue[1], begun_ns, begun_ns, lengths[queue]]
+            yield [kind, node, track, queue[1], begun_ns, ended_ns, arrow]
+        elif kind == 'publish':
+            publications[track] = [kind, node, track, name, begun_ns, ended_ns, []]
+            yield publications[track]
         else:
-            if kind == 'publish':
-                publications[track] = begun_ns
-            yield kind, node, track, str(name), begun_ns, ended_ns, value
+            yield [kind, node, track, name, begun_ns, ended_ns, value]
 
 
 class TracedInbox:
