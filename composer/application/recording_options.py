@@ -5,10 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from composer.errors import UsageError
-from composer.foxglove import require_foxglove
+from composer.errors import ComposerError, UsageError
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -122,7 +122,9 @@ def create_bridge(options: BridgeOptions, name: str) -> FoxgloveBridge:
     Raises:
         ComposerError: The library is not installed, or the port cannot be served.
     """
-    require_foxglove()
+    if find_spec('foxglove') is None:
+        message = 'Foxglove needs the package foxglove-sdk, which is not installed'
+        raise ComposerError(message, help="pip install 'rclpy-composer[foxglove]'")
     from composer.foxglove.bridge import FoxgloveBridge
     from composer.runtime.logs import system_logger
 

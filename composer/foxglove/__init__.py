@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
-from composer.errors import ComposerError
 from composer.records import record
 
 
@@ -21,14 +18,3 @@ class BridgeOptions:
     port: int
     address: str
     allows_changes: bool
-
-
-def require_foxglove() -> None:
-    """Do nothing if the library for Foxglove is installed.
-
-    Raises:
-        ComposerError: It is not.
-    """
-    if find_spec('foxglove') is None:
-        message = 'Foxglove needs the package foxglove-sdk, which is not installed'
-        raise ComposerError(message, help="pip install 'rclpy-composer[foxglove]'")
