@@ -18,9 +18,7 @@ from composer.runtime.tracing.timeline import Timeline
 from composer.runtime.tracing.tracer import TracePart
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from composer.runtime.health.system_state import Outcome
+    from collections.abc import Mapping
 
 _READ_SEC = 60.0
 
@@ -54,22 +52,8 @@ def trace(name: str | None, trace_sec: float, file: IO[str]) -> None:
             time.sleep(trace_sec)
         finally:
             # Also if it is interrupted: else the system would go on to note.
-            with client.asking(system, protocol.TRACE_READ) as ask:
-                parts = read_trace(ask)
-    write_timeline(file, parts)
-
-
-def read_trace(ask: Callable[[float], Outcome]) -> dict[str, TracePart]:
-    """End the trace of a system, and return what its processes have noted.
-
-    Raises:
-        ComposerError: It failed there, or the system does not answer.
-    """
-    text = ''
-    while not text.endswith('.'):
-        outcome = ask(_READ_SEC)
-        if not (outcome.succeeded and outcome.text):
-            raise ComposerError(outcome.text)
-        text += outcome.text
-    parts = json.loads(zlib.decompress(b64decode(text[:-1])))
-    return {worker: TracePart(*part) for worker, part in parts.items()}
+            read = client.ask(system, protocol.TRACE_READ, _READ_SEC)
+    if not read.succeeded:
+        raise ComposerError(read.text)
+    parts = json.loads(zlib.decompress(b64decode(read.text)))
+    write_timeline(file, {worker: TracePart(*part) for worker, part in parts.items()})

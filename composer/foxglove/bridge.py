@@ -21,9 +21,9 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from composer.errors import ComposerError, StartError
-from composer.foxglove.graph_access import GraphAccess
+from composer.foxglove.graph_access import GraphAccess, create_schema
 from composer.interfaces.classes import interface_name
-from composer.recordings.definitions import ENCODING, full_definition, import_message
+from composer.recordings.definitions import import_message
 from composer.recordings.system_recorder import SystemRecorder
 from composer.records import record
 from composer.runtime.middleware.ros_graph import create_graph_node
@@ -45,7 +45,6 @@ _BURST_SEC: Final = 0.03
 _ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
-_HIDDEN: Final = '/_'
 _LISTENER: Final = '_composer_foxglove_listener'
 _PROTOCOL: Final = 'foxglove.sdk.v1'
 
@@ -180,11 +179,11 @@ class FoxgloveBridge(GraphAccess):
         """Return the channel of a topic and type, of which there is one."""
         key = topic, interface_name(message_class)
         if key not in self._channels:
-            schema = self._create_schema(message_class)
-            channel = foxglove.Channel(
+            schema = create_schema(message_class)
+            base = foxglove.Channel(
                 topic, message_encoding='cdr', schema=schema, context=self._sink
             )
-            self._channels[key] = _Channel(topic, channel)
+            self._channels[key] = _Channel(topic, base)
         return self._channels[key]
 
     def finish(self, _remarks: Iterable[str] = ()) -> None:
@@ -201,7 +200,7 @@ class FoxgloveBridge(GraphAccess):
         topics = {
             (topic, each)
             for topic, types in self._node.get_topic_names_and_types()
-            if _HIDDEN not in topic
+            if '/_' not in topic
             for each in types
         }
         for topic, type_name in topics - self._channels.keys():
@@ -218,19 +217,14 @@ class FoxgloveBridge(GraphAccess):
         services = {
             name: types[0]
             for name, types in self._node.get_service_names_and_types()
-            if _HIDDEN not in name
+            if '/_' not in name
         }
         for name in services.keys() - self._services:
             with suppress(ComposerError):
-                service = self.create_service(name, services[name], self._create_schema)
-                self._server.add_services([service])
+                self._server.add_services([self.create_service(name, services[name])])
         if gone := self._services - services.keys():
             self._server.remove_services(list(gone))
         self._services = set(services)
-
-    def _create_schema(self, message_class: type) -> Any:
-        data = full_definition(message_class).encode()
-        return foxglove.Schema(name=interface_name(message_class), encoding=ENCODING, data=data)
 
     # What clients ask: `foxglove.websocket.ServerListener`
 

@@ -8,6 +8,7 @@ from functools import partial
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any, Final
 
+from foxglove import Schema
 from foxglove.websocket import (
     ConnectionGraph,
     MessageSchema,
@@ -24,13 +25,13 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.serialization import deserialize_message, serialize_message
 
 from composer.errors import CallTimeoutError, ComposerError
-from composer.interfaces.classes import import_interface
+from composer.interfaces.classes import import_interface, interface_name
 from composer.names import join_names
-from composer.recordings.definitions import import_message
+from composer.recordings.definitions import ENCODING, full_definition, import_message
 from composer.runtime.messages.payload_texts import create_parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from foxglove.websocket import Client, ClientChannel, ServiceRequest, WebSocketServer
     from rclpy.node import Node
@@ -167,9 +168,7 @@ class GraphAccess(ServerListener):
                 name, reason = request.parameters[0].name, response.results[0].reason
                 self.refuse(f'{node}.{name} was not set: {reason}')
 
-    def create_service(
-        self, name: str, type_name: str, create_schema: Callable[[type], Any]
-    ) -> Service:
+    def create_service(self, name: str, type_name: str) -> Service:
         """Return a service of the graph as clients call it.
 
         Raises:
@@ -210,6 +209,12 @@ class GraphAccess(ServerListener):
         """Publish a message of a client, in CDR."""
         if (publisher := self._publishers.get((client.id, client_channel_id))) is not None:
             publisher.publish(data)
+
+
+def create_schema(message_class: type) -> Schema:
+    """Return what tells clients the type of messages."""
+    data = full_definition(message_class).encode()
+    return Schema(name=interface_name(message_class), encoding=ENCODING, data=data)
 
 
 def _nodes_of(ends: Iterable[Any]) -> list[str]:

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 
 _STARTING = 'the system is still starting'
-# Of a trace, in one answer: more than a datagram takes many of them.
-_PART_SIZE = 400_000
 
 
 class AskedWorkers(Protocol):
@@ -131,7 +129,6 @@ class ControlServices:
 
         self._system = system
         self._commands = commands
-        self._trace = ''
         self.answered = float('-inf')
         # What changes no node is served beside a reload, which may wait for a goal.
         queries, changes = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
@@ -193,17 +190,13 @@ class ControlServices:
     def _begin_trace(self) -> Outcome:
         if self._system.write_trace is not None:
             return Outcome(succeeded=False, text='the system is traced already, by up --trace')
-        self._trace = ''
         self._system.begin_trace()
         return Outcome(succeeded=True, text='')
 
     def _read_trace(self) -> Outcome:
-        """End the trace, and return the next part of it; the last one ends with a dot."""
-        if not self._trace:
-            text = json.dumps(self._system.end_traces())
-            self._trace = f'{b64encode(zlib.compress(text.encode(), 1)).decode()}.'
-        part, self._trace = self._trace[:_PART_SIZE], self._trace[_PART_SIZE:]
-        return Outcome(succeeded=True, text=part)
+        """End the trace, and return it: JSON, compressed, in base64."""
+        data = zlib.compress(json.dumps(self._system.end_traces()).encode(), 1)
+        return Outcome(succeeded=True, text=b64encode(data).decode())
 
     def _stop_system(self) -> Outcome:
         self._system.request_stop()

@@ -29,7 +29,7 @@ class _Slice:
 
     Attributes:
         place: The numbers of its node and its track.
-        cause: The callback in which this was published, or in which its message was.
+        cause: Of a callback, the one in which its message was published.
         first: The callback that began the chain of causes.
     """
 
@@ -106,7 +106,6 @@ class Timeline:
                 ]
                 # Which of several coroutines it was, nobody knows.
                 if len(lasting) == 1:
-                    each.cause = lasting[0]
                     senders.update(((each.part, arrow), lasting[0]) for arrow in each.value)
 
     def render(self) -> str:
