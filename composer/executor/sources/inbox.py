@@ -6,7 +6,10 @@ import threading
 from collections import deque
 from contextlib import suppress
 from time import monotonic_ns
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class Inbox:
@@ -24,6 +27,7 @@ class Inbox:
         overruns: How many were pushed out.
         timings: How many of the next messages are timed.
         put_ns: When those of these that wait were put here, by their `id`.
+        tap: Called with each message before it is put here, if there is one.
     """
 
     __slots__ = (
@@ -34,6 +38,7 @@ class Inbox:
         'overruns',
         'put_ns',
         'source',
+        'tap',
         'timings',
     )
 
@@ -44,12 +49,15 @@ class Inbox:
         self.overruns = 0
         self.timings = 0
         self.put_ns: dict[int, int] = {}
+        self.tap: Callable[[Any], object] | None = None
         self._heir: Inbox | None = None
         self._passing_on = threading.RLock()
 
     def put(self, message: Any) -> None:
         """Hand over a message, which is the receiver's from now on."""
-        messages = self.messages
+        messages, tap = self.messages, self.tap
+        if tap is not None:
+            tap(message)
         if len(messages) == self.depth:
             self.overruns += 1
         if self.timings:

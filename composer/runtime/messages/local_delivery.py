@@ -28,7 +28,7 @@ from composer.runtime.messages.delivery_policies import (
     why_sent,
 )
 from composer.runtime.messages.ownership import ownership_of
-from composer.runtime.tracing.tracer import TracedInbox, tracer
+from composer.runtime.tracing.tracer import tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -77,8 +77,7 @@ class LocalPublisher:
         self._has_sent = False
         self._lock = threading.RLock()  # A finalizer may publish.
         # In one variable: another thread may hand over meanwhile.
-        self._receivers: tuple[tuple[_Receiver, ...], tuple[_Receiver, ...]] = ((), ())
-        self._matched: list[tuple[LocalSubscription, Inbox]] = []
+        self._receivers: tuple[tuple[Inbox, ...], tuple[Inbox, ...]] = ((), ())
         self._inboxes: tuple[Inbox, ...] = ()
         self._limited: tuple[Inbox, ...] = ()
         self._size = _NOWHERE
@@ -103,10 +102,13 @@ class LocalPublisher:
         matched = [each for each in subscriptions if are_compatible(profile, each.ros.qos_profile)]
         # Nothing is handed over meanwhile: the middleware never counts so few.
         self._size = _NOWHERE
-        inboxes = self._matched = [
+        inboxes = [
             (each, each.inbox) for each in matched if each.inbox is not None and not each.waits
         ]
-        self.follow_tracer()
+        self._receivers = (
+            tuple(inbox for each, inbox in inboxes if not each.read_only),
+            tuple(inbox for each, inbox in inboxes if each.read_only),
+        )
         self._inboxes = tuple(inbox for _, inbox in inboxes)
         self._limited = tuple(inbox for _, inbox in inboxes if inbox.depth is None)
         turned_off = '' if self.is_local else 'local_delivery: false'
@@ -115,17 +117,6 @@ class LocalPublisher:
         self._has_sent = self._has_sent or bool(self.reason)
         self.reason = next(filter(None, reasons), '')
         self._size = len(matched)
-
-    def follow_tracer(self) -> None:
-        """Have what is handed over noted while the tracer is on."""
-        receivers = [
-            (each, TracedInbox(each.node, each.what, inbox) if tracer.is_on else inbox)
-            for each, inbox in self._matched
-        ]
-        self._receivers = (
-            tuple(receiver for each, receiver in receivers if not each.read_only),
-            tuple(receiver for each, receiver in receivers if each.read_only),
-        )
 
     def is_heard(self) -> bool:
         """Return whether a message would go anywhere; count it, if not."""
@@ -211,7 +202,6 @@ class LocalPublisher:
 
 Tap: TypeAlias = 'Callable[[Any], object]'
 FindTap: TypeAlias = 'Callable[[LocalPublisher], Tap | None]'
-_Receiver: TypeAlias = 'Inbox | TracedInbox'
 
 
 class LocalSubscription:
@@ -268,8 +258,16 @@ class _Topic:
         self.publishers: list[LocalPublisher] = []
         self.subscriptions: list[LocalSubscription] = []
 
+    def follow_tracer(self) -> None:
+        """Have what is handed over noted while the tracer is on."""
+        for each in self.subscriptions:
+            if (inbox := each.inbox) is not None and not each.waits:
+                tap = tracer.create_inbox_tap
+                inbox.tap = tap(each.node, each.what, inbox) if tracer.is_on else None
+
     def connect(self) -> None:
         """Find out to which subscriptions each publisher hands over."""
+        self.follow_tracer()
         for publisher in self.publishers:
             publisher.connect(self.subscriptions)
 
@@ -308,6 +306,7 @@ class LocalTopics:
         """Ask anew who is told of messages; the tracer is while it is on."""
         with self._lock:
             for topic in self._topics.values():
+                topic.follow_tracer()
                 for publisher in topic.publishers:
                     self._tap_publisher(publisher)
 
@@ -322,7 +321,6 @@ class LocalTopics:
             return sum(bool(tap(message)) for tap in taps) > 0
 
         publisher.tap = (tell_all if taps[1:] else taps[0]) if taps else None
-        publisher.follow_tracer()
 
     def add_publisher(
         self, node: Any, ros: RosPublisher, *, is_local: bool = True

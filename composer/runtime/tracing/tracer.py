@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import threading
 from collections import defaultdict
 from contextlib import contextmanager, suppress
@@ -165,6 +164,24 @@ class Tracer:
 
         return tap
 
+    def create_inbox_tap(self, node: Any, what: str, inbox: Inbox) -> Callable[[Any], None]:
+        """Return what notes a message that is put into the queue of a subscription.
+
+        Args:
+            what: The subscription, as its callbacks are called.
+        """
+        queue, messages = (node.get_fully_qualified_name(), what), inbox.messages
+
+        def tap(message: Any) -> None:
+            length, now_ns = len(messages) + 1, self.now_ns()
+            if inbox.depth is not None and length > inbox.depth:
+                with suppress(IndexError):  # Another thread was faster.
+                    self.add((_PUSHED_OUT, queue, 0, id(messages[0]), now_ns, now_ns, 0))
+                length -= 1
+            self.add((_HANDED_OVER, queue, get_ident(), id(message), now_ns, now_ns, length))
+
+        return tap
+
 
 def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
     """Yield events for what was noted, in the order in which it began."""
@@ -175,12 +192,11 @@ def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
     waiting: defaultdict[int, dict[tuple[str, str], int]] = defaultdict(dict)
     lengths: dict[tuple[str, str], int] = {}
     for kind, node, track, name, begun_ns, ended_ns, value in noted:
+        queue = node if kind in (_PUSHED_OUT, _HANDED_OVER) else (node, str(name))
         if kind == _PUSHED_OUT:
-            queue = node.place
             waiting[name].pop(queue, None)
             yield ['dropped', queue[0], MARKS, queue[1], begun_ns, begun_ns, 1]
         elif kind == _HANDED_OVER:
-            queue = node.place
             if (publication := publications.get(track)) is not None:
                 lengths[queue] = value
                 waiting[name][queue] = arrow = next(arrows)
@@ -188,7 +204,6 @@ def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
                 publication[_VALUE].append(arrow)
                 yield ['queue', queue[0], MARKS, queue[1], begun_ns, begun_ns, value]
         elif kind == 'callback':
-            queue = node, str(name)
             if arrow := waiting[value].pop(queue, 0):
                 lengths[queue] = max(0, lengths[queue] - 1)
                 yield ['queue', node, MARKS, queue[1], begun_ns, begun_ns, lengths[queue]]
@@ -198,37 +213,6 @@ def _find_arrows(noted: Iterable[tuple[Any, ...]]) -> Iterator[TraceEvent]:
             yield publications[track]
         else:
             yield [kind, node, track, name, begun_ns, ended_ns, value]
-
-
-class TracedInbox:
-    """Stands for the queue of a subscription where messages are put into it.
-
-    Args:
-        what: The subscription, as its callbacks are called.
-
-    Attributes:
-        messages: Those of the queue.
-        most: How many it holds.
-        place: Its node and the name of its length.
-    """
-
-    def __init__(self, node: Any, what: str, inbox: Inbox) -> None:
-        self.messages = inbox.messages
-        self.most = math.inf if inbox.depth is None else inbox.depth
-        self.place = node.get_fully_qualified_name(), what
-        self._put = inbox.put
-
-    def put(self, message: Any) -> None:
-        """See `Inbox`."""
-        if tracer.is_on:
-            length, now_ns = len(self.messages), tracer.now_ns()
-            if length >= self.most:
-                with suppress(IndexError):  # Another thread was faster.
-                    pushed_out = id(self.messages[0])
-                    tracer.add((_PUSHED_OUT, self, 0, pushed_out, now_ns, now_ns, 0))
-                length -= 1
-            tracer.add((_HANDED_OVER, self, get_ident(), id(message), now_ns, now_ns, length + 1))
-        self._put(message)
 
 
 tracer = Tracer()
