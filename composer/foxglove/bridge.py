@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 _LOOK_SEC: Final = 1.0
 _STOP_SEC: Final = 2.0
 _BURST_SEC: Final = 0.03
+_IDLE_SEC: Final = 0.2
 _ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
@@ -137,7 +138,7 @@ class FoxgloveBridge(GraphAccess):
     def _run(self) -> None:
         """Send what comes in bursts: to wake a thread for each message costs far more."""
         next_look = 0.0
-        while not self._ended.wait(_BURST_SEC):
+        while not self._ended.wait(_BURST_SEC if self._wanted.total() else _IDLE_SEC):
             self._try(self._send)
             while self._changed:
                 self._try(self._recorder.follow, self._changed.popleft())
