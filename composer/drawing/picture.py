@@ -39,7 +39,8 @@ Side: TypeAlias = Literal['providers', 'users']
 # Policies whose values are clear without their names.
 _SELF_EXPLANATORY = ('reliability', 'durability', 'history')
 # What quotes nothing; messages of findings hide values themselves.
-_NEVER_HIDDEN = 'token kind role path findings remarks mark external place'.split()
+_NEVER_HIDDEN = {'token', 'kind', 'role', 'path', 'findings', 'remarks', 'mark'}
+_NEVER_HIDDEN |= {'external', 'place'}
 
 
 @record

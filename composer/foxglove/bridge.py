@@ -6,10 +6,12 @@ Messages are taken as a recording takes them: see `SystemRecorder`.
 from __future__ import annotations
 
 import json
+import os
 import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
+from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,6 +48,8 @@ _IDLE_SEC: Final = 0.2
 _ROOM: Final = 10_000
 # For a client that reads too slowly; older messages are dropped then.
 _BACKLOG: Final = 256
+# A client that takes nothing for so long is disconnected.
+_STALL_MS: Final = 5000
 _LISTENER: Final = '_composer_foxglove_listener'
 _PROTOCOL: Final = 'foxglove.sdk.v1'
 
@@ -106,6 +110,7 @@ class FoxgloveBridge(GraphAccess):
         except (OSError, RuntimeError, ValueError) as error:
             message = f'Foxglove cannot be served at {options.address}:{options.port}: {error}'
             raise StartError(message, help='--foxglove 0 takes any port that is free') from error
+        _limit_stalls(self._server.port)
         log.info(f'Foxglove: open ws://{options.address}:{self._server.port}')
         self._recorder = SystemRecorder(self, self, self._warn_once, _LISTENER, is_late=True)
         self._thread = threading.Thread(target=self._run, name='composer-foxglove', daemon=True)
@@ -265,3 +270,21 @@ class FoxgloveBridge(GraphAccess):
                 if isinstance(message, str) and '"connectionGraphUpdate"' in message:
                     self._may_show_graph.set()
         self._may_show_graph.clear()
+
+
+def _limit_stalls(port: int) -> None:
+    """Have the kernel end connections to clients that take nothing: the SDK would keep them.
+
+    Connections inherit the limit from the socket that listens.
+
+    Source: TCP_USER_TIMEOUT in https://man7.org/linux/man-pages/man7/tcp.7.html
+    """
+    for path in Path('/proc/self/fd').iterdir():
+        with suppress(OSError):
+            if not path.is_socket():
+                continue
+            with socket.socket(fileno=os.dup(int(path.name))) as found:
+                is_tcp = found.family in (socket.AF_INET, socket.AF_INET6)
+                listens = found.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+                if is_tcp and listens and found.getsockname()[1] == port:
+                    found.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _STALL_MS)

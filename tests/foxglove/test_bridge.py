@@ -2,9 +2,10 @@
 
 import json
 import re
+import socket
 import struct
 import time
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 
 import pytest
 
@@ -162,6 +163,14 @@ def connected(port, **options):
         yield Foxglove(socket)
 
 
+def is_connected(client):
+    """Return whether the kernel still has a connection: TCP_CLOSE is 7."""
+    # The library closes it once it has noticed its end.
+    with suppress(OSError):
+        return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 7
+    return False
+
+
 def port_of(system):
     return int(re.search(r'ws://127\.0\.0\.1:(\d+)', system.output)[1])
 
@@ -228,10 +237,11 @@ def test_clients_see_what_nodes_publish_and_nothing_changes_by_it(port, peer, ca
         wait_for(lambda: not sender.get_subscription_count(), 'the end of the subscription')
 
 
-def test_who_does_not_read_holds_nobody_up(port):
+def test_who_does_not_read_holds_nobody_up_and_is_disconnected(port):
     with ExitStack() as stack:
-        # It takes nothing more from the kernel than fits its queue.
-        mute = stack.enter_context(connected(port, max_queue=1, ping_interval=None))
+        # It takes nothing more from the kernel than fits its queue, and only its pings find out.
+        pings = {'ping_interval': 0.2, 'ping_timeout': None}
+        mute = stack.enter_context(connected(port, max_queue=1, **pings))
         mute.subscribe('/count', 1)
         mute.subscribe('/big', 2)
         reader = stack.enter_context(connected(port))
@@ -242,6 +252,8 @@ def test_who_does_not_read_holds_nobody_up(port):
                     one.subscribe('/count', 1)
         numbers = [message.data for message in reader.messages(1, Int64, count=100)]
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        wait_for(lambda: not is_connected(mute.socket.socket), 'the end of the connection')
+        assert is_connected(reader.socket.socket)
 
 
 def test_a_system_is_shown_from_beside_it_where_clients_change_and_keep_nothing(
