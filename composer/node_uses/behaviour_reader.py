@@ -28,7 +28,7 @@ from composer.node_uses.reading import (
     unknown_reading,
     wire_of,
 )
-from composer.node_uses.walk import TooLongError, Walk
+from composer.node_uses.walk import Places, TooLongError, Walk
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import ModuleSource
 from composer.python_source.return_values import ends_without_value, never_returns
@@ -76,6 +76,9 @@ class BehaviourReader:
 
     Args:
         has_real_type: Whether the type of an entity is the one that is meant.
+
+    Attributes:
+        places: As of a `Walk`, of all behaviours that were read.
     """
 
     def __init__(self, modules: ModuleFinder, has_real_type: Callable[[EndSpec], bool]) -> None:
@@ -85,7 +88,7 @@ class BehaviourReader:
         self._read: dict[object, Reading] = {}
         self._wires: dict[DataPath, Wire] = {}
         self._mentions: dict[int, Mentions] = {}
-        self._followed: set[int] = set()
+        self.places: Places = {}
 
     def read(self, node: NodeSpec, binding: Binding) -> Reading:
         """Return what a behaviour does with its node."""
@@ -108,7 +111,7 @@ class BehaviourReader:
         found = Mentions()
         for key, module in reading.modules.items():
             if key not in self._mentions:
-                self._mentions[key] = _find_mentions(module, self._followed)
+                self._mentions[key] = _find_mentions(module, self.places)
             found.names |= self._mentions[key].names
             found.open_kinds |= self._mentions[key].open_kinds
         return found
@@ -127,7 +130,7 @@ class BehaviourReader:
             name = behaviour.class_name or behaviour.function
             is_missing = not (name in top.statements or top.is_open or top.is_dynamic)
             return missing_reading() if is_missing else unknown_reading()
-        walk = Walk(self._names, self._followed)
+        walk = Walk(self._names, self.places)
         try:
             second = 'changes' if binding.parameters[-1] == 'changes' else 'message'
             values = [Chain(('node',)), Chain((second,))][: len(binding.parameters)]

@@ -330,7 +330,8 @@ class Run:
     """What all parts of a reading share.
 
     Attributes:
-        doubts: The number of conditions around the place on which the file decides.
+        doubts: The number of conditions before the place on which the file decides.
+        branches: Those of them that it is on a branch of.
         state_doubts: Likewise, on which what is kept in the state does.
         held_states: The names of the state of which one of the latter is that they hold.
         fixed: Those of the first that hang on a constant, a type or the node's name.
@@ -344,6 +345,7 @@ class Run:
         self.names = names
         self.reading = Reading()
         self.doubts = 0
+        self.branches = 0
         self.state_doubts = 0
         self.fixed = 0
         self.held_states: tuple[str, ...] = ()
@@ -374,8 +376,11 @@ class Run:
         """
         before = self.standing
         self.doubt(chosen, held)
+        is_of_file = chosen in ('file', 'fixed')
+        self.branches += is_of_file
         with self.guard(is_guard=chosen == 'fixed'):
             yield
+        self.branches -= is_of_file
         self.standing = before
 
     def doubt(self, chosen: str, held: str = '') -> None:

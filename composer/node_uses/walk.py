@@ -8,7 +8,7 @@ import re
 from functools import cache
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.entity_kinds import GOAL_STATUSES
 from composer.node_uses import node_calls, waiting
@@ -125,6 +125,9 @@ _INSTEAD = {
 }
 
 
+Places: TypeAlias = dict[int, tuple[bool, bool, bool]]
+
+
 class TooLongError(Exception):
     """A behaviour is too long to be walked through."""
 
@@ -133,12 +136,15 @@ class Walk:
     """Notes what one behaviour does.
 
     Attributes:
-        followed: The functions that were walked through, by their syntax trees.
+        places: The functions, statements and expressions that were walked through, by the
+            identities of their syntax trees. Of each, whether errors are caught there, whether
+            it is on a branch on which the file decides, and whether it comes after such a
+            decision; of several ways there, of the most certain one.
     """
 
-    def __init__(self, names: Names, followed: set[int]) -> None:
+    def __init__(self, names: Names, places: Places) -> None:
         self.run = Run(names)
-        self.followed = followed
+        self.places = places
         self._names = names
         # The functions under way, the behaviour first.
         self._under_way: list[Scope] = []
@@ -178,7 +184,7 @@ class Walk:
                 run.escape(chain)
         if len(self._under_way) >= _DEEPEST:
             return
-        self.followed.add(id(definition))
+        self._note_place(definition)
         scope = Scope(function.module, definition, given, function.scope, waits=is_waited)
         run.reading.modules |= {id(each): each for each in (function.module, *function.makers)}
         before = run.standing
@@ -189,6 +195,11 @@ class Walk:
             self._block(definition.body, scope)
         self._under_way.pop()
         run.standing = before
+
+    def _note_place(self, node: ast.AST) -> None:
+        run = self.run
+        here = (bool(run.guards or run.broad_guards), run.branches > 0, run.doubts > 0)
+        self.places[id(node)] = min(here, self.places.get(id(node), here))
 
     def _follow(
         self, function: Function, call: ast.Call, scope: Scope, *, is_waited: bool
@@ -233,6 +244,7 @@ class Walk:
             self._statement(statement, scope)
 
     def _statement(self, node: ast.stmt, scope: Scope) -> None:
+        self._note_place(node)
         match node:
             case ast.If() | ast.While():
                 self._branch(node, scope)
@@ -542,6 +554,7 @@ class Walk:
         self._names.walked += 1
         if self._steps > _MOST_STEPS or self._names.walked > _MOST_STEPS_IN_ALL:
             raise TooLongError
+        self._note_place(node)
         match node:
             case ast.Name() | ast.Attribute() | ast.Subscript():
                 self._visit_name(node, scope)

@@ -10,28 +10,19 @@ import itertools
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
-from composer.python_source.syntax import FUNCTIONS, words_in
+from composer.python_source.syntax import FUNCTIONS, SCOPES, words_in
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from composer.node_uses.walk import Places
     from composer.python_source.syntax import FunctionNode
     from composer.stubs.checking.annotated_copies import AnnotatedCopy
     from composer.stubs.checking.type_checker import TypeReport
 
 # What asks what a value is.
 _TESTS = frozenset({'hasattr', 'isinstance', 'issubclass', 'callable', 'type'})
-# What a missing name raises, and what these errors are.
-_CAUGHT = frozenset(
-    {
-        *('AttributeError', 'BaseException', 'ComposerError', 'Exception', 'KeyError'),
-        *('LookupError', 'PayloadError', 'TypeError', 'UndeclaredError'),
-        'UndeclaredParameterError',
-    }
-)
-# What a node has in one system and not in another.
-_OF_FILE = frozenset({'parameters', 'name'})
+# What may not run, or catch errors of what is in it.
+_CONDITIONS = (ast.If, ast.IfExp, ast.BoolOp, ast.While, ast.Match, ast.Try, ast.With)
 
 
 @record
@@ -40,6 +31,7 @@ class ReportedPlace:
 
     copy: AnnotatedCopy
     report: TypeReport
+    places: Places
 
     @cached_property
     def _start(self) -> tuple[int, int]:
@@ -99,7 +91,7 @@ class ReportedPlace:
     def is_left_alone(self) -> bool:
         """Whether what the report is about may be caught or asked for, or is never reached."""
         chain, function = self.around, self.function
-        if not chain or any(itertools.starmap(_is_guarded, itertools.pairwise(chain))):
+        if not chain or self._standing[0]:
             return True
         asked = _asked_in(function) if function else frozenset()
         inner = next((i for i, node in enumerate(chain) if isinstance(node, ast.stmt)), 0)
@@ -110,25 +102,20 @@ class ReportedPlace:
     @property
     def is_chosen_by_file(self) -> bool:
         """Whether only the file decides whether what the report is about is reached."""
-        return any(map(_is_of_file, _tests_before(self.around)))
+        return self._standing[1]
 
     @property
     def depends_on_file(self) -> bool:
-        """Whether the report comes after a branch that ends its function as the file says.
+        """Whether it may be reached only as the file has decided before."""
+        return self._standing[2]
 
-        Of a branch with the report in it, `is_chosen_by_file` knows.
-        """
-        function, around = self.function, {id(node) for node in self.around}
-        if function is None:
-            return True
-        extra = {each.arg for each in (*function.args.args[2:], *function.args.kwonlyargs)}
-        inside = {id(test) for test in _tests_before(self.around)}
-        return any(
-            self.copy.start(node)[0] <= self.report.line
-            and (any(map(_is_of_file, tests)) or extra & words_in(*tests))
-            and (inside & {*map(id, tests)} or (id(node) not in around and _may_end(node)))
-            for node, tests in _branches_in(function)
-        )
+    @cached_property
+    def _standing(self) -> tuple[bool, bool, bool]:
+        """As of a `Walk`; what no behaviour comes to is left alone on any condition."""
+        inside = [*itertools.takewhile(lambda node: not isinstance(node, SCOPES), self.around)]
+        known = [self.places[id(node)] for node in inside if id(node) in self.places]
+        is_conditional = any(isinstance(node, _CONDITIONS) for node in inside)
+        return known[0] if known else (is_conditional, is_conditional, True)
 
 
 # Reports come a function after the other.
@@ -141,75 +128,3 @@ def _asked_in(function: FunctionNode) -> frozenset[str]:
         if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in _TESTS
         for name in words_in(*node.args)
     )
-
-
-@lru_cache(maxsize=1)
-def _branches_in(function: FunctionNode) -> list[tuple[ast.AST, list[ast.expr]]]:
-    """Return the branches in a function, each with its conditions."""
-    return [(node, tests) for node in ast.walk(function) if (tests := _tests_of(node))]
-
-
-def _tests_of(node: ast.AST) -> list[ast.expr]:
-    """Return the conditions of a branch."""
-    match node:
-        case ast.BoolOp(values=[*tests, _]):
-            return tests
-        case ast.If() | ast.IfExp() | ast.While() | ast.Assert():
-            return [node.test]
-        case ast.Match(subject=subject):
-            return [subject]
-    return []
-
-
-def _may_end(branch: ast.AST) -> bool:
-    ends = (ast.Return, ast.Raise, ast.Break, ast.Continue)
-    return isinstance(branch, ast.Assert) or any(isinstance(n, ends) for n in ast.walk(branch))
-
-
-def _tests_before(chain: list[ast.AST]) -> Iterator[ast.expr]:
-    """Yield the conditions that decide whether the innermost node of a chain is reached."""
-    for inner, node in itertools.pairwise(chain):
-        tests = _tests_of(node)
-        if inner not in tests[:1]:
-            yield from tests
-
-
-def _is_of_file(test: ast.AST) -> bool:
-    """Return whether the file alone may decide on a condition, or on a part of one."""
-    if isinstance(test, ast.Attribute) and test.attr in _OF_FILE:
-        return True
-    children = [each for each in ast.iter_child_nodes(test) if not isinstance(each, ast.Constant)]
-    if isinstance(test, ast.Call) and isinstance(test.func, ast.Name):
-        children.remove(test.func)
-    # A value of the run beside one of the file: both outcomes may come.
-    is_joined = isinstance(test, ast.Compare | ast.BinOp | ast.Call)
-    operands = [each for each in children if isinstance(each, ast.expr | ast.keyword)]
-    if is_joined:
-        return bool(operands) and all(map(_is_of_file, operands))
-    return any(map(_is_of_file, children))
-
-
-def _is_guarded(inner: ast.AST, node: ast.AST) -> bool:
-    """Return whether errors in a part of a node are caught, or the part may never run."""
-    match node:
-        case ast.Try() | ast.TryStar():
-            types = [each.type for each in node.handlers]
-            return inner in node.body and (None in types or bool(_CAUGHT & words_in(*types)))
-        case ast.With() | ast.AsyncWith():
-            calls = [each.context_expr for each in node.items]
-            names = words_in(*(each for each in calls if isinstance(each, ast.Call)))
-            return inner in node.body and bool(names & {'suppress', 'raises'})
-        case ast.If() | ast.IfExp():
-            return inner is not node.test and _is_fixed(node.test)
-    return False
-
-
-def _is_fixed(test: ast.expr) -> bool:
-    """Return whether a condition may hold always or never: a constant, or an identity."""
-    if isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is | ast.IsNot):
-        other = test.comparators[0]
-        is_member = isinstance(other, ast.Attribute) and other.attr.isupper()
-        return not (isinstance(other, ast.Constant) or is_member)
-    if isinstance(test, ast.Constant):
-        return True
-    return isinstance(test, ast.Name) and (test.id.isupper() or test.id == '__debug__')

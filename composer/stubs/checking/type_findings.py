@@ -130,7 +130,7 @@ class TypeFindings:
     ) -> Iterator[tuple[Diagnostic, range]]:
         """Yield the findings in a module, with the lines of the statements that they are in."""
         for report in reports:
-            place = ReportedPlace(copy, report)
+            place = ReportedPlace(copy, report, self.context.behaviours.places)
             reader = self._readers.get(report.kind)
             problem = reader(place) if reader and not place.is_left_alone else None
             if problem and place.is_chosen_by_file and not self._is_in_any_system(place, problem):
