@@ -6,7 +6,7 @@ import importlib.util
 import os
 import sys
 from functools import cache
-from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -85,6 +85,8 @@ class ModuleFinder:
         self._locate = cache(self._locate_anew)
         self._list_names = cache(_list_names)
         self._tokens_left = MAX_TOKENS_OF_MODULES
+        # Python lists a folder once, until its time of change is another one.
+        importlib.invalidate_caches()
 
     def find(self, name: str) -> ModuleSource | MissingModule:
         """Return the module `package.module`, or the part of its name that is missing."""
@@ -186,24 +188,7 @@ class ModuleFinder:
         return file
 
     def _locate_part(self, part: str, folders: list[Path]) -> tuple[Path | None, list[Path]]:
-        """Return the file of a module or package, and the folders of its modules.
-
-        As in Python's path finder, each folder is listed once, the first regular package or module
-        wins, and folders without an `__init__.py` form one namespace package.
-        """
-        portions: list[Path] = []
-        for folder in folders:
-            names = self._list_names(folder)
-            package = folder / part
-            if part in names and os.path.isfile(package / '__init__.py'):
-                return package / '__init__.py', [package]
-            for suffix in ('.py', *EXTENSION_SUFFIXES):
-                name = f'{part}{suffix}'
-                if name in names and os.path.isfile(folder / name):
-                    return folder / name, []
-            if part in names and os.path.isdir(package):
-                portions.append(package)
-        return None, portions
+        return _places_of(PathFinder.find_spec(part, [*map(str, folders)]))
 
 
 def _list_names(folder: Path) -> frozenset[str]:
@@ -213,13 +198,17 @@ def _list_names(folder: Path) -> frozenset[str]:
         return frozenset()
 
 
-def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
-    """Ask the other importers, such as those of editable installs, for a top-level name."""
-    try:
-        spec = importlib.util.find_spec(part)
-    except (ImportError, ValueError, AttributeError):
-        return None, []
+def _places_of(spec: ModuleSpec | None) -> tuple[Path | None, list[Path]]:
+    """Return the file of a module or package, and the folders of its modules."""
     if spec is None:
         return None, []
     file = Path(spec.origin) if spec.origin else None
     return file, [Path(entry) for entry in spec.submodule_search_locations or ()]
+
+
+def _locate_with_importers(part: str) -> tuple[Path | None, list[Path]]:
+    """Ask the other importers, such as those of editable installs, for a top-level name."""
+    try:
+        return _places_of(importlib.util.find_spec(part))
+    except (ImportError, ValueError, AttributeError):
+        return None, []
