@@ -529,18 +529,29 @@ def find_all(browser, selector):
 
 
 def click(browser, selector, text=''):
-    """Click the first element with a text; lists are made anew all the time."""
-    from selenium.common import StaleElementReferenceException
+    """Click the first element with a text."""
+    act_on(browser, selector, lambda element: element.click(), text)
 
-    def is_clicked():
-        with suppress(StaleElementReferenceException):
+
+def act_on(browser, selector, act, text=''):
+    """Act on the first element with a text, once it stands still: lists are made anew all the time."""
+    from selenium.common import exceptions
+
+    moving = (
+        exceptions.StaleElementReferenceException,
+        exceptions.ElementClickInterceptedException,
+        exceptions.ElementNotInteractableException,
+    )
+
+    def is_done():
+        with suppress(*moving):
             for element in find_all(browser, selector):
                 if text in element.text:
-                    element.click()
+                    act(element)
                     return True
         return False
 
-    wait_for(is_clicked, selector)
+    wait_for(is_done, selector)
 
 
 def read_text(browser, selector):
@@ -924,9 +935,7 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     browser.get(acting.address)
     wait_for(lambda: find('#tree button'), 'the nodes')
     browser.get(f'http://127.0.0.1:{acting.port}/#node%3A%2Fleft%2Ftalker')
-    field = wait_for(lambda: find('#parameters input'), 'a parameter')[0]
-    field.clear()
-    field.send_keys('3.5\n')
+    act_on(browser, '#parameters input', lambda field: field.clear() or field.send_keys('3.5\n'))
     wait_for(lambda: text_of('#parameters form pre') == 'gain = 3.5', 'the answer')
     assert 'def say(node)' in text_of('#details')
     assert find('#details a')[0].get_attribute('href').startswith('vscode://file/')
@@ -934,8 +943,8 @@ def test_a_browser_shows_it(page, acting, shared_compose, browser):
     click(browser, '#acts form button')
     wait_for(lambda: EVIL in text_of('#acts form pre'), 'the response')
     browser.get(f'http://127.0.0.1:{acting.port}/#node%3A%2Fleft%2Ftalker')
-    typed = wait_for(lambda: find('#parameters input'), 'a parameter')[0]
-    typed.send_keys('4')
+    act_on(browser, '#parameters input', lambda field: field.send_keys('4'))
+    typed = find('#parameters input')[0]
     drawn = find('main svg')
     text = (shared_compose.folder / 'system.yaml').read_text()
     (shared_compose.folder / 'system.yaml').write_text(re.sub(r'rate: \d+', 'rate: 8', text))
