@@ -241,7 +241,7 @@ class Names:
                 owner = self.value_of(inner, scope)
                 return None if owner is None else self.attribute(owner, name)
             case ast.Subscript(value=inner, slice=index):
-                return _item_of(self.value_of(inner, scope), index)
+                return self._item_of(self.value_of(inner, scope), index)
             case ast.Call():
                 return self._result_of(node, scope)
         return None
@@ -272,8 +272,16 @@ class Names:
         if isinstance(expression, ast.Tuple | ast.List):
             values = [self.value_of(item, scope) for item in expression.elts]
             return reduce(_either, values) if values else None
-        value = self.value_of(expression, scope)
-        return Chain((*value.path, '[]')) if _is_of_message(value) else None
+        return self._item_of(self.value_of(expression, scope))
+
+    def _item_of(self, owner: Value | None, index: ast.expr | None = None) -> Value | None:
+        """Return an item of something in a message."""
+        if not _is_of_message(owner):
+            return None
+        match index:
+            case ast.Constant(value=int(number)):
+                return Chain((*owner.path, f'[{number}]'))
+        return None if isinstance(index, ast.Slice) else Chain((*owner.path, '[]'))
 
     def top_value(self, module: ModuleSource, name: str) -> Value | None:
         """Return what a name at the top of a module stands for."""
@@ -388,10 +396,14 @@ class Names:
                 method, kept = stored[0]
                 if len(stored) > 1 or self._is_stored(each.module, name, 1):
                     return None
-                given: dict[str, Value] = dict(instance.given) if method.name == '__init__' else {}
-                given |= dict.fromkeys(positional_names(method)[:1], instance)
+                given = self._given_in(method, instance)
                 return self.value_of(kept, Scope(each.module, method, given))
         return None
+
+    def _given_in(self, method: FunctionNode, instance: Instance) -> dict[str, Value]:
+        """Return what is known of the arguments of a method."""
+        given: dict[str, Value] = dict(instance.given) if method.name == '__init__' else {}
+        return given | dict.fromkeys(positional_names(method)[:1], instance)
 
     def _is_stored(self, module: ModuleSource, name: str, times: int = 0) -> bool:
         """Return whether code may store an attribute more often than that."""
@@ -524,16 +536,6 @@ def _either(one: Value | None, other: Value | None) -> Value | None:
     if isinstance(one, Texts) and isinstance(other, Texts):
         return Texts((*one.options, *other.options))
     return one if one == other else None
-
-
-def _item_of(owner: Value | None, index: ast.expr) -> Value | None:
-    """Return an item of something in a message."""
-    if not _is_of_message(owner):
-        return None
-    match index:
-        case ast.Constant(value=int(number)):
-            return Chain((*owner.path, f'[{number}]'))
-    return None if isinstance(index, ast.Slice) else Chain((*owner.path, '[]'))
 
 
 def _is_of_message(value: Value | None) -> TypeGuard[Chain]:

@@ -63,6 +63,14 @@ class FunctionUse:
     bindings: list[tuple[Binding, Wire]] = field(default_factory=list)
     is_called: bool = False
 
+    @property
+    def given(self) -> dict[str, Value]:
+        """What the parameters stand for that are given nodes or messages alone."""
+        return {
+            name: Chain(('node' if each.nodes else 'message',))
+            for name, each in self.received.items()
+        }
+
     def give(self, name: str, value: Value | None, node: NodeSpec, wire: Wire) -> None:
         """Note what a parameter is given by a behaviour of a node."""
         received = self.received.setdefault(name, Received())

@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import ast
 import builtins
-import itertools
 import re
 import sys
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
 from composer.node_uses.message_uses import explain_unknown
-from composer.node_uses.names import assignments, find_stored
+from composer.node_uses.names import (
+    Chain,
+    Class,
+    External,
+    Instance,
+    Names,
+    Scope,
+    find_stored,
+)
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import (
@@ -35,13 +42,15 @@ from composer.stubs.checking.left_alone import ReportedPlace
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
     from composer.interfaces.descriptions import FieldType, MessageDescription
     from composer.language.specs import NodeSpec
-    from composer.node_uses.names import Stored
+    from composer.node_uses.names import Value
+    from composer.python_source.module_finder import ModuleFinder
+    from composer.python_source.syntax import FunctionNode
     from composer.stubs.checking.annotated_copies import (
         AnnotatedCopy,
         FunctionKey,
@@ -90,8 +99,6 @@ _TAKEN = {
 }
 _INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 _DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
-# From a name to what it stands for, at most.
-_MOST_STEPS = 6
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
 _TIMES = frozenset({'Time', 'Duration'})
@@ -100,6 +107,82 @@ _TIME_MESSAGES = {f'msg.{each}': f'builtin_interfaces/msg/{each}' for each in so
 _OF_PYTHON = frozenset({*dir(builtins), *sys.stdlib_module_names})
 # Classes of Python, of which fields and parameters are.
 _PLAIN_OWNERS = _SCALARS | {'array', 'list', 'Mapping'}
+
+
+class _Origins(Names):
+    """What names stand for, also of what methods and sums give, and of items of anything."""
+
+    def __init__(self, finder: ModuleFinder, functions: Iterable[FunctionUse]) -> None:
+        super().__init__(finder)
+        self._uses = {id(use.definition): use for use in functions}
+
+    def find(self, place: ReportedPlace, value: ast.expr) -> Value | None:
+        """Return what a value stands for at the place of a report."""
+        scope = Scope(place.copy.module.source)
+        for index, node in reversed([*enumerate(place.around)]):
+            match node:
+                case ast.FunctionDef() | ast.AsyncFunctionDef():
+                    classes = (each for each in place.around if isinstance(each, ast.ClassDef))
+                    of = next(classes, None)
+                    instance = Instance(Class(scope.module, of)) if of else None
+                    scope = Scope(scope.module, node, self._given_in(node, instance), scope)
+                case ast.Lambda():
+                    given = self._given_to(node, place.around[index:], scope)
+                    scope = Scope(scope.module, node, given, scope)
+                case ast.For(target=target) if not stored_names(target) & {*find_stored(node)}:
+                    scope = _inside(ast.For(target, node.iter, [], []), scope)
+                case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
+                    scope = _inside(node, scope)
+        return self.value_of(value, scope)
+
+    def _given_in(self, method: FunctionNode, instance: Instance | None) -> dict[str, Value]:
+        use = self._uses.get(id(method))
+        own = dict.fromkeys(positional_names(method)[:1], instance)
+        return {name: each for name, each in own.items() if each} | (use.given if use else {})
+
+    def _given_to(
+        self, function: ast.Lambda, around: Sequence[ast.AST], scope: Scope
+    ) -> dict[str, Value]:
+        """Return what a function of one parameter is called with, if that is known."""
+        call = next((each for each in around if isinstance(each, ast.Call)), None)
+        match call, positional_names(function):
+            case (
+                ast.Call(
+                    func=ast.Name(id='filter' | 'map' | 'max' | 'min' | 'sorted'),
+                    args=[*first, items],
+                ),
+                [name],
+            ) if first in ([], [function]):
+                item = self._item_of(self.value_of(items, scope))
+                return {name: item} if item else {}
+        return {}
+
+    def _value_of(self, node: ast.expr, scope: Scope) -> Value | None:
+        match node:
+            case ast.Await(value=inner):
+                return self.value_of(inner, scope)
+            case ast.BinOp(left=left):
+                # A time plus something is a time.
+                origin = self.value_of(left, scope)
+                is_time = isinstance(origin, Chain) and origin.path[-2:] == ('now', '()')
+                return origin if is_time else None
+        return super()._value_of(node, scope)
+
+    def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
+        function = self.value_of(call.func, scope)
+        if isinstance(function, Chain):
+            return Chain((*function.path, '()'))
+        return super()._result_of(call, scope)
+
+    def _item_of(self, owner: Value | None, _index: ast.expr | None = None) -> Value | None:
+        return Chain((*owner.path, '[]')) if isinstance(owner, Chain) else None
+
+
+def _inside(loop: ast.AST, scope: Scope) -> Scope:
+    """Return the scope of a loop, as that of a function without parameters."""
+    no_arguments = ast.arguments([], [], None, [], [], None, [])
+    function = ast.Lambda(no_arguments, cast('ast.expr', loop))
+    return Scope(scope.module, function, {}, scope)
 
 
 @record
@@ -125,6 +208,10 @@ class TypeFindings:
     modules: frozenset[str]
     defined: frozenset[str]
 
+    @cached_property
+    def _origins(self) -> _Origins:
+        return _Origins(self.context.modules, self.functions.values())
+
     def explain_all(
         self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
     ) -> Iterator[tuple[Diagnostic, range]]:
@@ -148,14 +235,8 @@ class TypeFindings:
         used: list[ast.expr] = [node, *place.calls]
         for each in place.around:
             used += each.targets if isinstance(each, ast.Assign) else []
-        for owner in map(owner_of, used):
-            stored = isinstance(owner, ast.Name) and _sources(place, owner.id)
-            sources = stored or [(owner, False)]
-            match sources[0][0]:
-                case ast.Call(func=ast.Name()) as made if len(sources) == 1:
-                    if _is_made(place.copy.module.source.imports, made):
-                        return True
-        return False
+        origins = (self._origins.find(place, owner_of(each)) for each in used)
+        return any(isinstance(each, Chain) and each.path[0] == 'made' for each in origins)
 
     @cached_property
     def _readers(self) -> Mapping[str, Callable[[ReportedPlace], _Problem | None]]:
@@ -290,52 +371,27 @@ class TypeFindings:
 
     def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value is no union, of which reports name the part that does not fit."""
-        if (
-            self._is_declared(place, value)
-            or _is_annotated(place, value)
-            or _is_time(place, value)
-        ):
+        if self._is_declared(place, value) or _is_annotated(place, value):
             return True
         value = owner_of(value)
-        value = value.value if isinstance(value, ast.Await) else value
-        imports = place.copy.module.source.imports
-        if not isinstance(value, ast.Name):
-            return _is_made(imports, value)
-        stored = find_stored(place.function).get(value.id)
-        if stored is None:
-            use = self._use(place)
-            is_received = bool(use and value.id in use.received)
-            return is_received or bool(_INTERFACE.search(imports.get(value.id, '')))
-        (made, is_item), *others = stored
-        return not (others or is_item) and _is_made(imports, made)
+        match self._origins.find(place, value):
+            case Chain(path=(_,)):
+                return True
+            case External(name=name) if _INTERFACE.search(name):
+                return True
+        known: ast.AST | None = value
+        if isinstance(value, ast.Name):
+            stored = find_stored(place.function).get(value.id, [])
+            known = stored[0][0] if len(stored) == 1 and not stored[0][1] else None
+        return _is_made(place.copy.module.source.imports, known)
 
-    def _is_declared(
-        self, place: ReportedPlace, value: ast.AST | None, seen: frozenset[str] = frozenset()
-    ) -> bool:
+    def _is_declared(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value comes from the node or a message, in one way only.
 
         The state is left out: what a name of it stands for may change.
         """
-        imports = place.copy.module.source.imports
-        while not isinstance(value, ast.Name):
-            match value:
-                case ast.Call(func=ast.Name(id=name)):
-                    return bool(_INTERFACE.search(imports.get(name, '')))
-                case ast.Attribute(attr='state'):
-                    return False
-                case ast.Call(func=inner) | ast.Attribute(value=inner):
-                    value = inner
-                case ast.Subscript(value=inner) | ast.Await(value=inner):
-                    value = inner
-                case _:
-                    return False
-        stored = _sources(place, value.id)
-        if stored is None:
-            use = self._use(place)
-            return bool(use and value.id in use.received)
-        (known, _), *others = stored
-        is_one = not others and value.id not in seen
-        return is_one and self._is_declared(place, known, seen | {value.id})
+        origin = self._origins.find(place, value)
+        return isinstance(origin, Chain) and origin.path[1:2] != ('state',)
 
     # Arguments
 
@@ -712,22 +768,6 @@ def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
     return False
 
 
-def _is_time(place: ReportedPlace, value: ast.AST | None) -> bool:
-    """Return whether a value is what the clock of the node says, or comes of that."""
-    for _ in range(_MOST_STEPS):
-        match value:
-            case ast.BinOp(left=left):
-                value = left
-            case ast.Call(func=ast.Attribute(attr='now')):
-                return True
-            case ast.Name(id=name):
-                sources = _sources(place, name) or []
-                value = sources[0][0] if len(sources) == 1 else None
-            case _:
-                return False
-    return False
-
-
 def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
     """Return whether the project annotates what a value is of, with the name of one class."""
     while isinstance(value, ast.Attribute) and not isinstance(value.value, ast.Name):
@@ -750,33 +790,6 @@ def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
         ]
     names = [words_in(each) - {'None', 'Optional'} for each in written if each is not None]
     return bool(names) and all(len(each) == 1 for each in names)
-
-
-def _sources(place: ReportedPlace, name: str) -> list[Stored] | None:
-    """Return what a name stands for where a report is; see `find_stored`."""
-    for index, node in enumerate(place.around):
-        loops: list[ast.AST] = getattr(node, 'generators', [])
-        if isinstance(node, ast.Lambda) and name in positional_names(node):
-            call = next(
-                (each for each in place.around[index:] if isinstance(each, ast.Call)), None
-            )
-            return [(_items_given(call, node), True)]
-        if isinstance(node, ast.For) and name not in find_stored(node):
-            loops = [node]
-        for target, value, is_item in itertools.chain.from_iterable(map(assignments, loops)):
-            if isinstance(target, ast.Name) and target.id == name:
-                return [(value, is_item)]
-    return find_stored(place.function).get(name)
-
-
-def _items_given(call: ast.Call | None, function: ast.Lambda) -> ast.expr | None:
-    """Return the items with which a call calls a function of one parameter, if it is known."""
-    match call:
-        case ast.Call(
-            func=ast.Name(id='filter' | 'map' | 'max' | 'min' | 'sorted'), args=[*first, items]
-        ) if first in ([], [function]) and len(function.args.args) == 1:
-            return items
-    return None
 
 
 def _type_of_literal(literal: re.Match[str]) -> str:

@@ -1,0 +1,29 @@
+"""What an object keeps of its node, and of messages."""
+
+import math
+
+from geometry_msgs.msg import Twist
+
+
+class Keeper:
+    def __init__(self, node):
+        self.node = node
+        self.limit = node.parameters.speed
+        self.words = []
+
+    def hear(self, node, odometry):
+        for each in self.node.parameters.speed:  # error
+            node.logger.info(f'{each}')
+        node.logger.info('at ' + self.node.parameters.speed)  # error
+        node.logger.info(f'{self.limit + "m"}')  # error
+        self.words.append(odometry.child_frame_id)
+        if self.node.parameters.frame == 3:  # error
+            self.words.clear()
+
+    def drive(self, node):
+        twist = Twist()
+        twist.angular.z = math.sqrt(self.node.parameters.frame)  # error
+        node.logger.info(f'{self.node.parameters.names["a"]}')  # error
+        began = self.node.now()
+        node.logger.info('began ' + (began - self.node.now()))  # error
+        return twist
