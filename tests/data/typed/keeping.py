@@ -14,7 +14,7 @@ class Keeper:
     def hear(self, node, odometry):
         for each in self.node.parameters.speed:  # error
             node.logger.info(f'{each}')
-        node.logger.info('at ' + self.node.parameters.speed)  # error
+        self.words.append('at ' + self.node.parameters.speed)  # error
         node.logger.info(f'{self.limit + "m"}')  # error
         self.words.append(odometry.child_frame_id)
         if self.node.parameters.frame == 3:  # error
@@ -25,5 +25,5 @@ class Keeper:
         twist.angular.z = math.sqrt(self.node.parameters.frame)  # error
         node.logger.info(f'{self.node.parameters.names["a"]}')  # error
         began = self.node.now()
-        node.logger.info('began ' + (began - self.node.now()))  # error
+        self.words.append('began ' + (began - self.node.now()))  # error
         return twist
