@@ -80,10 +80,11 @@ _SPINNING = frozenset(
 _METHOD = re.compile(r'^    def ([a-z]\w*)', re.MULTILINE)
 _OF_MAPPING = frozenset({'get', 'items', 'keys', 'values'})
 # Functions that take no `None`.
-_NEEDING = frozenset(
-    f'builtins.{name}'
-    for name in ('enumerate', 'float', 'int', 'len', 'list', 'sorted', 'sum', 'tuple', 'zip')
+_NEEDING = re.compile(
+    r'math\.\w+|builtins\.(abs|enumerate|float|int|len|list|max|min|range|round|sorted|sum|tuple|zip)'
 )
+# Those that take one after their first argument.
+_NEEDING_ONE = ('builtins.round', 'math.perm')
 # Functions that keep nothing of what they are given.
 _HARMLESS = frozenset(
     f'builtins.{name}'
@@ -280,6 +281,7 @@ class Walk:
             case ast.Global(names=names):
                 self._note_globals(names, scope)
             case ast.AugAssign(target=target, value=value):
+                self._need_operands(node, scope)
                 self.visit(value, scope)
                 if not self._read_target(target, scope):
                     self.visit(target, scope)
@@ -520,8 +522,10 @@ class Walk:
         key = id(scope.definition)
         if key not in self._asked:
             self._asked[key] = set()
-            for node in list_nodes(_tests_in(scope.definition)):
-                if isinstance(node, ast.Attribute | ast.Name):
+            nodes = list_nodes(_tests_in(scope.definition))
+            operands = {id(each) for node in nodes for each in self._operands_of(node, scope)}
+            for node in nodes:
+                if isinstance(node, ast.Attribute | ast.Name) and id(node) not in operands:
                     match self._names.value_of(node, scope):
                         case Chain(path=('node', 'parameters' | 'state' as of, name, *_)):
                             self._asked[key].add(f'{of}.{name}')
@@ -542,6 +546,28 @@ class Walk:
                     needed = NeededValue(of, name, scope.module.span_of(node), run.held_states)
                     run.reading.values_needed.append(needed)
 
+    def _need_operands(self, node: ast.AST, scope: Scope) -> None:
+        for operand in self._operands_of(node, scope):
+            self.need(operand, scope)
+
+    def _operands_of(self, node: ast.AST, scope: Scope) -> list[ast.expr]:
+        """Return the parts of an expression, or of `x += 1`, that cannot be `None`."""
+        match node:
+            case ast.BinOp(left=one, op=op, right=other) | ast.AugAssign(one, op, other):
+                return [] if isinstance(op, ast.Mod) else [one, other]
+            case ast.Compare(left, [ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE(), *_], others):
+                return [left, *others]
+            case ast.Subscript(value=owner):
+                return [owner]
+            case ast.FormattedValue(shown, -1, ast.JoinedStr([ast.Constant(), *_])):
+                return [shown]
+            case ast.Call(func=func, args=args, keywords=keywords):
+                match self._names.value_of(func, scope):
+                    case External(name=name) if _NEEDING.fullmatch(name):
+                        is_keyed = len(args) > 1 and any(each.arg == 'key' for each in keywords)
+                        return [] if is_keyed else args[:1] if name in _NEEDING_ONE else args
+        return []
+
     # Expressions
 
     def visit(self, node: ast.expr, scope: Scope) -> None:
@@ -555,6 +581,7 @@ class Walk:
         if self._steps > _MOST_STEPS or self._names.walked > _MOST_STEPS_IN_ALL:
             raise TooLongError
         self._note_place(node)
+        self._need_operands(node, scope)
         match node:
             case ast.Name() | ast.Attribute() | ast.Subscript():
                 self._visit_name(node, scope)
@@ -577,9 +604,6 @@ class Walk:
             case ast.Compare():
                 self._compare(node, scope)
             case _:
-                if isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Mod):
-                    self.need(node.left, scope)
-                    self.need(node.right, scope)
                 self._visit_all(node, scope)
 
     def _visit_all(self, node: ast.AST, scope: Scope) -> None:
@@ -603,7 +627,6 @@ class Walk:
             self._visit_calls(node, scope)
             return
         if isinstance(node, ast.Subscript):
-            self.need(node.value, scope)
             self._subscript(node, scope)
         elif isinstance(node, ast.Attribute):
             self.visit(node.value, scope)
@@ -680,9 +703,6 @@ class Walk:
                         operands = [node.left]
                 for each in getattr(container, 'elts', ()):
                     self._compare_with(node.left, each, scope)
-            case ast.Compare(ops=[ast.Lt() | ast.LtE() | ast.Gt() | ast.GtE(), *_]):
-                for operand in operands:
-                    self.need(operand, scope)
             case ast.Compare(ops=[ast.Eq() | ast.NotEq()], comparators=[ast.Constant()]):
                 self._compare_with(node.left, operands[1], scope)
         for operand in operands:
@@ -792,6 +812,8 @@ class Walk:
         is_guarded = run.guards or run.broad_guards or run.fixed
         if path and (is_write or not is_guarded):
             value = self._stored.get(id(node))
+            if value is not None:
+                self.need(value, scope)
             # The type of a message that the behaviour makes is the same in any system.
             certain = bool(of_type) or not run.doubts
             use = MessageUse(path, node, scope.module, is_write, certain, of_type, value)
@@ -894,8 +916,6 @@ class Walk:
         is_harmless = isinstance(func, External) and func.name in _HARMLESS
         for node in nodes:
             value = self._names.value_of(node, scope)
-            if isinstance(func, External) and func.name in _NEEDING:
-                self.need(node, scope)
             if is_harmless and isinstance(value, Chain) and value.path[0] == 'node':
                 if value.path != ('node',):
                     self._note_read(value, node, scope)
