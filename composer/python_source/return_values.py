@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from itertools import product
 from typing import TYPE_CHECKING
 
 from composer.python_source.annotations import dotted_name
@@ -45,9 +44,9 @@ def always_answers(function: FunctionNode) -> bool:
     """
     message = _message_of(function)
     sure = set() if message in stored_names(function) else {message}
-    raises = any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function))
-    ends = not raises and _ends(function)
-    return ends and all(_is_value(each.value, sure) for each in _returns(function))
+    if any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function)):
+        return False
+    return _ends(function) and all(_is_value(each.value, sure) for each in _returns(function))
 
 
 def _message_of(function: FunctionNode) -> str:
@@ -176,18 +175,10 @@ class _Ways:
     def _past_match(self, node: ast.Match, tested: frozenset[str]) -> _Tested:
         within = tested | self._subjects(node.subject)
         ends = [self.follow(case.body, within) for case in node.cases]
-        tests = [
-            ast.Compare(node.subject, [ast.Eq()], [case.pattern.value])
-            for case in node.cases
-            if isinstance(case.pattern, ast.MatchValue)
-        ]
-        is_past = len(tests) == len(node.cases) and all(map(self._is_one_text, tests))
+        texts = [getattr(case.pattern, 'value', None) for case in node.cases]
+        is_past = all(self._is_one_text(node.subject, text) for text in texts)
         match node.cases[-1]:
-            case ast.match_case(
-                pattern=ast.MatchAs(pattern=None)
-                | ast.MatchOr(patterns=[*_, ast.MatchAs(pattern=None)]),
-                guard=None,
-            ):
+            case ast.match_case(ast.MatchAs(None) | ast.MatchOr([*_, ast.MatchAs(None)]), None):
                 return _join(*ends)
         return _join(*ends, within if is_past or not self._is_certain else None)
 
@@ -227,12 +218,20 @@ class _Ways:
 
     def _may_fail(self, test: ast.expr, tested: frozenset[str]) -> bool:
         """Return whether a test may be false, whatever was tested before."""
-        if isinstance(test, ast.Constant) or not self._is_certain or self._is_one_text(test):
-            return not (isinstance(test, ast.Constant) and test.value)
-        parts = test.values if isinstance(test, ast.BoolOp) and isinstance(test.op, ast.Or) else []
-        subjects = [subject for part in parts for subject in self._subjects(part)]
+        parts: list[ast.expr] = []
+        match test:
+            case ast.Constant(value):
+                return not value
+            case ast.Compare(left, [ast.Eq()], [other]) if self._is_one_text(left, other):
+                return True
+            case ast.BoolOp(ast.Or(), parts):
+                pass
+        if not self._is_certain:
+            return True
         # It may name all that there are.
-        is_whole = len(subjects) > len(set(subjects)) or any(
+        subjects = [subject for part in parts for subject in self._subjects(part)]
+        is_double = len(subjects) > len(set(subjects)) and not _are_of_several(parts)
+        is_whole = is_double or any(
             (isinstance(node, ast.Call) and _last_name(node.func) in _TESTS_OF_TYPES)
             or (
                 isinstance(node, ast.Compare)
@@ -243,12 +242,10 @@ class _Ways:
         )
         return not is_whole and not self._is_tested(test, tested)
 
-    def _is_one_text(self, test: ast.expr) -> bool:
-        """Return whether a test is for one text in the message: it may always be another."""
-        match test:
-            case ast.Compare(left, [ast.Eq()], [ast.Constant(value=str())]):
-                return self._is_given(left)
-        return False
+    def _is_one_text(self, tested: ast.expr, text: object) -> bool:
+        """Return whether something in the message is tested for a text: it may be another."""
+        is_text = isinstance(text, ast.Constant) and isinstance(text.value, str)
+        return is_text and self._is_given(tested)
 
     def _is_given(self, expression: ast.expr) -> bool:
         """Return whether a value is of the message, which may be any."""
@@ -257,9 +254,10 @@ class _Ways:
 
     def _is_tested(self, expression: ast.expr, tested: frozenset[str]) -> bool:
         """Return whether something of an expression, or that it is a part of, was tested."""
-        pairs = product(self._subjects(expression), tested)
         return any(
-            f'{one}.'.startswith(f'{two}.') or two.startswith(f'{one}.') for one, two in pairs
+            f'{one}.'.startswith(f'{two}.') or two.startswith(f'{one}.')
+            for one in self._subjects(expression)
+            for two in tested
         )
 
     def _subjects(self, expression: ast.expr) -> set[str]:
@@ -282,6 +280,14 @@ class _Ways:
             else:
                 pending.extend(ast.iter_child_nodes(node))
         return subjects
+
+
+def _are_of_several(tests: list[ast.expr]) -> bool:
+    """Return whether tests are of several names that one call may give: `a > 2 or b > 2`."""
+    compared = [each for each in tests if isinstance(each, ast.Compare)]
+    names = {each.left.id for each in compared if isinstance(each.left, ast.Name)}
+    ways = {type(each.ops[0]) for each in compared}
+    return len(names) == len(tests) and len(ways) == 1 and ways <= {ast.Gt, ast.Lt}
 
 
 def _is_endless(loop: ast.For | ast.AsyncFor | ast.While) -> bool:

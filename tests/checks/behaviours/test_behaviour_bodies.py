@@ -297,6 +297,7 @@ UNANSWERED = {
     f'if request.data: return None\n    {GIVES}': 2,
     f'with open("x") as file:\n        if file: {GIVES}': 1,
     f'for _ in range(3):\n        try: {GIVES}\n        except OSError: print()': 1,
+    f'a, b = divmod(request.data, 5)\n    if a > 2 or b > 2: {GIVES}': 1,
 }
 ANSWERED = (
     f'if request.data: {GIVES}\n    raise ValueError',
@@ -310,6 +311,8 @@ ANSWERED = (
     # Ways that may not be there.
     f'if request.data: {GIVES}\n    elif not request.data: {GIVES}',
     f'bad = not request.data\n    if bad: {GIVES}\n    if request.data: {GIVES}',
+    f'good, bad = divmod(request.data, 5)\n    if good or bad: {GIVES}',
+    f'low, high = 1, 2\n    if request.data > low or request.data > high: {GIVES}',
     f'x = open("x")\n    if x.readable(): {GIVES}\n    elif x.writable(): {GIVES}',
     f'match request.data:\n        case True: {GIVES}\n        case False: {GIVES}',
     f'while request.data:\n        if node.name: {GIVES}\n    else: {GIVES}',
