@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from composer.entity_kinds import TRANSITION_BEHAVIOURS
 from composer.node_uses.names import (
@@ -19,6 +19,7 @@ from composer.node_uses.names import (
     is_of_project,
 )
 from composer.node_uses.reading import (
+    CREATING_METHODS,
     SENDING_METHODS,
     USED_NOUNS,
     Payload,
@@ -36,7 +37,7 @@ from composer.python_source.syntax import FUNCTIONS, is_none, list_children, own
 from composer.records import record
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Collection, Iterable, Iterator
 
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
@@ -56,6 +57,8 @@ _ANSWERS: dict[str, tuple[set[type], str]] = {
 
 _TYPES = {ast.Compare: bool, ast.Dict: dict, ast.List: list, ast.JoinedStr: str}
 _FUNCTIONS = (*FUNCTIONS, ast.Lambda)
+# What code may hand on to use any of it.
+_PARTS = {'own_state': 'own_state', 'parameters': 'parameter'}
 
 
 @dataclass(slots=True)
@@ -64,10 +67,14 @@ class Mentions:
 
     Attributes:
         names: Its texts, the attributes that it names, and the globals that it stores.
+        stored: Those of the names that it may set in the state.
+        created: The kinds and names of what it may create; `None` for any name.
         open_kinds: The kinds of which it may use any.
     """
 
     names: set[str] = field(default_factory=set)
+    stored: set[str] = field(default_factory=set)
+    created: set[tuple[str, Any]] = field(default_factory=set)
     open_kinds: set[str] = field(default_factory=set)
 
 
@@ -109,11 +116,14 @@ class BehaviourReader:
     def mentions(self, reading: Reading) -> Mentions:
         """Return what the modules of a behaviour may use beside what was read of it."""
         found = Mentions()
-        for key, module in reading.modules.items():
-            if key not in self._mentions:
-                self._mentions[key] = _find_mentions(module, self.places)
-            found.names |= self._mentions[key].names
-            found.open_kinds |= self._mentions[key].open_kinds
+        parts: list[Any] = [reading, *reading.modules.values()]
+        for part in parts:
+            if id(part) not in self._mentions:
+                is_module = isinstance(part, ModuleSource)
+                unread = _unread(part, self.places) if is_module else part.unresolved
+                self._mentions[id(part)] = _find_mentions(unread)
+            for each in fields(found):
+                getattr(found, each.name).update(getattr(self._mentions[id(part)], each.name))
         return found
 
     def _read_anew(self, binding: Binding, wire: Wire) -> Reading:
@@ -280,15 +290,11 @@ def _type_of(value: ast.expr) -> type | None:
     return _TYPES.get(type(value))
 
 
-def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
-    """Return what the code of a module may use that was not followed.
-
-    Args:
-        followed: The functions that were, by their syntax trees.
-    """
+def _find_mentions(nodes: Iterable[ast.AST]) -> Mentions:
+    """Return what code may use of which nobody knows whether it is of the node."""
     found = Mentions()
     plain: set[int] = set()
-    for node in _unread(module, followed):
+    for node in nodes:
         match node:
             case ast.Constant(value=str(text)):
                 found.names.add(text)
@@ -296,20 +302,35 @@ def _find_mentions(module: ModuleSource, followed: Collection[int]) -> Mentions:
                 found.names.update(names)
             case ast.Attribute(attr=attribute):
                 found.names.add(attribute)
-                if attribute == 'parameters' and id(node) not in plain:
-                    found.open_kinds.add('parameter')
+                if attribute in _PARTS and id(node) not in plain:
+                    found.open_kinds.add(_PARTS[attribute])
+        match node:
+            case ast.Attribute(value=ast.Name(id='self')):
+                pass
+            case ast.Attribute(attr=name, ctx=ast.Store()):
+                found.stored.add(name)
+            case ast.Call(func=ast.Name(id='setattr'), args=[_, ast.Constant(str(name)), _]):
+                found.stored.add(name)
+            case ast.Subscript(slice=ast.Constant(value=str(name))):
+                found.names.add(name)
+                if isinstance(node.ctx, ast.Store):
+                    found.stored.add(name)
+            case ast.Call(func=ast.Attribute(attr=method), args=[_, channel, *_]) if (
+                method in CREATING_METHODS
+            ):
+                named = [each.value for each in node.keywords if each.arg == 'name'] or [channel]
+                made = named[0].value if isinstance(named[0], ast.Constant) else None
+                found.created.add((CREATING_METHODS[method], made))
         match node:
             case (
-                ast.Attribute(value=ast.Attribute(attr='parameters') as parameters)
-                | ast.Subscript(
-                    value=ast.Attribute(attr='parameters') as parameters, slice=ast.Constant()
-                )
+                ast.Attribute(value=ast.Attribute(attr='parameters') as part)
+                | ast.Subscript(value=ast.Attribute() as part, slice=ast.Constant())
             ):
-                plain.add(id(parameters))
-            case ast.Call(func=ast.Attribute(attr=method), args=[name, *_]) if (
+                plain.add(id(part))
+            case ast.Call(func=ast.Attribute(attr=method), args=[sent, *_]) if (
                 method in SENDING_METHODS
             ):
-                if not isinstance(name, ast.Constant):
+                if not isinstance(sent, ast.Constant):
                     found.open_kinds.add(SENDING_METHODS[method])
             case ast.Call(func=ast.Name('exec' | 'eval')):
                 found.open_kinds |= USED_NOUNS

@@ -165,6 +165,8 @@ _WRAPS = External('functools.wraps')
 _INSTALLED = {'site-packages', 'dist-packages'}
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
 Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
+# The arguments of `getattr` without a default.
+_GETATTR = 2
 # Longer ways from a name to its value are not followed.
 _MOST_STEPS = 25
 
@@ -445,6 +447,10 @@ class Names:
                 return Chain(('made', interface))
             case Class() as of:
                 return self.instance_of(of, call, scope)
+            case External(name='builtins.getattr') if len(call.args) == _GETATTR:
+                owner, named = (self.value_of(each, scope) for each in call.args)
+                method = only_text(named)
+                return Chain(('node', method)) if method and owner == Chain(('node',)) else None
             case Chain(path=('node', 'send_goal')):
                 sent = self.value_of(call.args[0], scope) if call.args else None
                 client = only_text(sent)

@@ -40,6 +40,8 @@ SENDING_METHODS = {
     'call_async': 'service client',
     'send_goal': 'action client',
 }
+# All methods by whose first arguments code may name something of the node.
+NAMING_METHODS = frozenset({*CREATING_METHODS, *SENDING_METHODS, 'get', 'setdefault', 'update'})
 
 
 @record
@@ -225,6 +227,7 @@ class Reading:
         compared: The parameters that it compares with texts, each with the text and its place.
         sleeps: How long it sleeps, in seconds, and where.
         passed: What the functions are given that it runs.
+        unresolved: Attributes, items and calls of what may be the node, or not.
     """
 
     uses: list[NodeUse] = field(default_factory=list)
@@ -252,6 +255,7 @@ class Reading:
     values_needed: list[NeededValue] = field(default_factory=list)
     compared: list[tuple[str, str, Span]] = field(default_factory=list)
     passed: list[Passed] = field(default_factory=list)
+    unresolved: list[ast.AST] = field(default_factory=list)
 
     def open_all(self) -> None:
         """Note that the node was given to something unknown."""

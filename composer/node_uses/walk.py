@@ -24,6 +24,7 @@ from composer.node_uses.names import (
     Value,
 )
 from composer.node_uses.reading import (
+    NAMING_METHODS,
     Awaited,
     MessageUse,
     NeededValue,
@@ -369,7 +370,8 @@ class Walk:
         """Walk through an assignment; the node may have another name, or be kept in its object."""
         known = self._names.value_of(value, scope)
         is_kept = isinstance(known, Chain | Function) and all(
-            isinstance(each, ast.Name) or self._names.value_of(each, scope) == known
+            self._names.value_of(each, scope) == known
+            or (isinstance(each, ast.Name) and known != Chain(('node', 'own_state')))
             for each in targets
         )
         if isinstance(value, ast.Tuple) and all(isinstance(each, ast.Tuple) for each in targets):
@@ -629,11 +631,16 @@ class Walk:
         if isinstance(node, ast.Subscript):
             self._subscript(node, scope)
         elif isinstance(node, ast.Attribute):
+            self._note_unresolved(node.value, node, scope)
             self.visit(node.value, scope)
         elif isinstance(node.ctx, ast.Load):
             self._check_defined(node, scope)
-            if isinstance(value, Function):
-                self._hand_on(value, [])
+        if isinstance(value, Function) and isinstance(node.ctx, ast.Load):
+            self._hand_on(value, [])
+
+    def _note_unresolved(self, inner: ast.expr, node: ast.expr, scope: Scope) -> None:
+        if self._names.value_of(inner, scope) is None:
+            self.run.reading.unresolved.append(node)
 
     def _visit_calls(self, node: ast.expr, scope: Scope) -> None:
         """Visit the call whose result a chain begins with, as in `node.send_goal('a').status`."""
@@ -671,6 +678,7 @@ class Walk:
                 help_text = 'write node.state.NAME'
                 self.run.report('unknown-attribute', scope.module, node, text, help_text)
             case _:
+                self._note_unresolved(node.value, node, scope)
                 self.visit(node.value, scope)
         self.visit(key, scope)
 
@@ -853,6 +861,8 @@ class Walk:
                 return
         func = self._names.value_of(call.func, scope)
         match func:
+            case None if getattr(call.func, 'attr', '') in NAMING_METHODS:
+                self.run.reading.unresolved += list_nodes([call])
             case Chain():
                 self._call_chain(func, call, scope, is_awaited=is_awaited)
                 return
@@ -1014,6 +1024,9 @@ class Walk:
                 run.reading.state_tested |= texts
                 for text in texts if function.endswith('setattr') else ():
                     run.set_state(text, scope, call)
+            case None:
+                run.reading.unresolved += list_nodes([call])
+                return False
             case Chain(path=('node', 'state')):
                 run.reading.is_state_open = True
             case _:

@@ -58,8 +58,9 @@ def check_bodies(context: CheckContext) -> Iterator[Diagnostic]:
             bindings.is_for_something |= bool(getattr(binding.entity, 'publish', None))
             bindings.is_for_something |= binding.key.returned not in (None, PUBLISHED)
     found: dict[tuple[Span | None, str], Diagnostic] = {}
-    for node in context.spec.nodes.values():
-        readings = readings_of(context, node)
+    # What was not read of a module is only known once all is read.
+    read = [(node, readings_of(context, node)) for node in context.spec.nodes.values()]
+    for node, readings in read:
         for binding, reading in readings:
             bindings = bound[binding.behaviour.name]
             for finding in _Body(context, node, binding, reading, readings, bindings).findings():
@@ -202,10 +203,12 @@ class _Body:
             return
         if self.context.was_dropped((*node.path, 'state')):
             return
+        mentions = [self.context.behaviours.mentions(reading) for reading in readings]
         known = set(node.state).union(*(reading.state_set for reading in readings))
         tested = set().union(*(reading.state_tested for reading in readings))
+        tested |= set().union(*(each.stored for each in mentions))
         used = tested.union(*({use.name for use in each.state_read} for each in readings))
-        mentioned = self.context.behaviours.mentions(self.reading).names
+        mentioned = set().union(*(each.names for each in mentions))
         for name, place in self.reading.state_set.items():
             near = find_nearest(name, node.state)
             # One that is set for nobody may be meant to be a declared one.
@@ -223,8 +226,11 @@ class _Body:
         """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
         owner = self.binding.own_state_of
         own = [reading for binding, reading in self.readings if binding.own_state_of == owner]
+        mentions = [self.context.behaviours.mentions(reading) for reading in own]
         known = set().union(*(reading.own_state_set for reading in own))
+        known |= set().union(*(each.stored for each in mentions))
         is_open = any(reading.is_own_state_open for reading in own)
+        is_open |= any('own_state' in each.open_kinds for each in mentions)
         for use in () if is_open else self.reading.own_state_read:
             if use.name not in known and not use.is_guarded:
                 text = f"nothing sets '{use.name}' in the own_state of {self.binding.owner}"

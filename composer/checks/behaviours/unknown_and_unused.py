@@ -64,6 +64,8 @@ def _check_names(
         is_open = any(reading.reaches_ros for _, reading in uses[name])
         is_open |= node.has_other_parameters
         created = {(each.kind, each.name) for _, read in uses[name] for each in read.created}
+        mentions = [context.behaviours.mentions(reading) for _, reading in uses[name]]
+        created |= {pair for each in mentions for pair in each.created}
         used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
             known = declared[binding.behaviour.name]

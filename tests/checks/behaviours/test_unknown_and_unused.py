@@ -259,3 +259,101 @@ def test_state_that_no_behaviour_uses_is_found(check, line, is_unused):
     system = NODE.replace('    publishers', '    state: {laps: 0}\n    publishers')
     found = check(system, run(USES_ALL, line), rule='unused-state')
     assert bool(found) == is_unused
+
+
+GIVEN = 'def __init__(self, node): self.kept = node\n    '
+PROPERTY = '@property\n    def node(self): return self.kept\n'
+WITHIN = 'with self.open() as n:\n            '
+
+
+@pytest.mark.parametrize(
+    ('code', 'node', 'before'),
+    [
+        (f'class C:\n    {GIVEN}{PROPERTY}', 'self.node', ''),
+        (f'class M:\n    {PROPERTY}class C(M):\n    {GIVEN}', 'self.node', ''),
+        (f'class C:\n    {GIVEN}{PROPERTY}', 'n', 'n = self.node; '),
+        (f'class C:\n    {GIVEN}def __getattr__(self, name): return 1\n', 'self', ''),
+        (
+            f'class C:\n    {GIVEN}@contextmanager\n    def open(self): yield self.kept\n',
+            'n',
+            WITHIN,
+        ),
+        ('@dataclass\nclass C:\n    node: object\n', 'self.node', ''),
+        ('N = 0\nclass C:\n    def __init__(self, node):\n        global N; N = node\n', 'N', ''),
+        ('class C:\n    def __init__(self, n): C.c = self; self.n = n\n', 'C.c.n', ''),
+        (f'class C:\n    {GIVEN}', 'copy(self).kept', ''),
+        (f'class C:\n    {GIVEN}', 'self.kept', 'Thread(target=self.work).start()'),
+        (f'class C:\n    {GIVEN}', 'self.kept', 'F(self.work)()'),
+        (f'class C:\n    {GIVEN}', 'self.kept', 'vars(self)["work"]()'),
+    ],
+)
+def test_what_is_done_through_a_node_that_nobody_can_follow_is_done(check, code, node, before):
+    used = [
+        f"{node}.state.heard = 1; {node}.own_state['x'] = 1; {node}.publish('out', 'a')",
+        f"{node}.create_publisher('std_msgs/msg/String', 'extra', 10)",
+        f'print({node}.parameters.speed)',
+    ]
+    lines = '; '.join(used)
+    is_apart = before[-1:] == ')'
+    code += f"""
+    def run(self, node):
+        {before or 'pass; '}{'' if is_apart else lines}
+        print(node.state.heard, node.own_state['x'])
+        node.publish('extra', 'b')
+
+    def work(self):
+        {lines if is_apart else 'pass'}
+
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass
+from threading import Thread
+class F:
+    def __init__(self, f): self.f = f
+    def __call__(self): self.f()
+"""
+    assert check(NODE.replace('parts:run', 'parts:C.run'), code) == []
+
+
+@pytest.mark.parametrize(
+    ('line', 'use', 'is_found'),
+    [
+        ("entries = node.own_state; entries |= {'x': 1}", "node.own_state['x']", False),
+        ('json.loads().node.own_state.update(x=1)', "node.own_state['x']", False),
+        ("setattr(json.loads('').node.state, 'x', 1)", 'node.state.x', False),
+        ("getattr(node, 'create_publisher')(MSG, 'x')", "node.publish('x', '')", False),
+        (
+            "json.loads('').node.create_publisher(MSG, '/a', name='x')",
+            "node.publish('x', '')",
+            False,
+        ),
+        ('json.loads().node.create_publisher(MSG, sys.argv[1])', "node.publish('x', '')", False),
+        ("json.loads('').node.create_publisher(MSG, 'y')", "node.publish('x', '')", True),
+        (
+            "print(json.loads('').x, json.loads('').state.x, json.loads('').own_state['x'])",
+            'node.state.x',
+            True,
+        ),
+        (
+            "print(json.loads('').x, json.loads('').state.x, json.loads('').own_state['x'])",
+            "node.own_state['x']",
+            True,
+        ),
+    ],
+)
+def test_of_what_may_be_made_only_that_name_is_known(check, line, use, is_found):
+    code = "import json, sys\nMSG = 'std_msgs/msg/String'\n" + run(USES_ALL, line, use)
+    assert bool(check(NODE, code)) == is_found
+
+
+@pytest.mark.parametrize('line', ['Thread(target=self.work).start()', 'register(self.work)'])
+def test_a_method_that_is_handed_on_is_read(check, line):
+    code = f"""
+from threading import Thread
+from far import register
+class C:
+    {GIVEN}
+    def run(self, node): {USES_ALL}; {line}
+    def work(self): self.kept.publish('outt', '')
+"""
+    assert (8, 'unknown-publisher') in check(NODE.replace('parts:run', 'parts:C.run'), code)
