@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from composer.records import record
 from composer.stubs.message_stubs import StubImports, is_writable
+from composer.stubs.stored_types import ANYTHING, types_of_state
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from composer.language.specs import NodeSpec, ParameterSpec
     from composer.node_uses.reading import CreatedEntity
+    from composer.stubs.stored_types import StoredTypes
 
 # The types of the entities of one section, by name. Behaviours create some whose name or type is
 # not known: that is empty.
@@ -32,16 +33,10 @@ _PARAMETER_TYPES = {
 }
 # The parameters that rclpy declares for every node.
 _OWN_PARAMETERS = {'use_sim_time': 'bool', 'start_type_description_service': 'bool'}
-_ANYTHING = 'Any'
 # Of the full name of a type: `std_msgs/msg/String`.
 _SLASHES = 2
 # The types of choices that a type can name.
 _NAMED = (bool, int, str)
-# Whoever uses these may set names that no check can see.
-_OPEN = frozenset({'__dict__', 'vars'})
-# The methods of a node that return what has a type of its own.
-_RETURNED = {'now': 'Time'}
-_NUMBERS = frozenset({'int', 'float'})
 
 
 @record
@@ -60,19 +55,20 @@ class NodeShape:
 
 def shape_of(
     node: NodeSpec,
-    stored: Sequence[Mapping[str, frozenset[str]] | None],
+    stored: Sequence[StoredTypes],
     created: Sequence[CreatedEntity],
 ) -> NodeShape:
     """Return the shape of a node.
 
     Args:
-        stored: What `find_stored_names` returns of each module of its behaviours.
+        stored: What each module of its behaviours stores.
         created: What its behaviours create.
     """
     known = [names for names in stored if names is not None]
     parameters = {name: _type_of(each) for name, each in node.parameters.items()}
     names = sorted({*node.state}.union(*known))
-    state = ((name, (_type_of_state(node.state.get(name), known, name),)) for name in names)
+    values = {name: [node.state[name]] if name in node.state else [] for name in names}
+    state = ((name, types_of_state(values[name], known, name)) for name in names)
     return NodeShape(
         _types(node.publishers, created, 'publisher'),
         _types(node.service_clients, created, 'service client'),
@@ -128,87 +124,11 @@ def _type_of(parameter: ParameterSpec) -> str:
 
     One that is not set has the value `None`, until somebody sets it.
     """
-    of_type = _PARAMETER_TYPES.get(parameter.type or '', _ANYTHING)
+    of_type = _PARAMETER_TYPES.get(parameter.type or '', ANYTHING)
     choices = parameter.choices or ()
     if of_type in ('int', 'str') and choices and all(type(each) in _NAMED for each in choices):
         of_type = f'Literal[{", ".join(map(repr, choices))}]'
-    return f'{of_type} | None' if parameter.value is None and of_type != _ANYTHING else of_type
-
-
-def find_stored_names(tree: ast.Module, module: str) -> dict[str, frozenset[str]] | None:
-    """Return every name that a module sets as an attribute of anything, with the types of values.
-
-    It need not be `node.state` itself that it names: that may be passed on, or have another name.
-    A class of the module itself is shown as `module:Class`.
-
-    Returns:
-        None if it may set names that are not written out.
-    """
-    names: dict[str, set[str]] = {}
-    nodes = [*ast.walk(tree)]
-    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
-    classes = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
-    own = {name: f'{module}:{name}' for name in classes}
-    imports = [
-        alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
-    ]
-    # Arrays of NumPy turn what they are added to into an array.
-    has_arrays = any(name.partition('.')[0] == 'numpy' for name in imports)
-    # What is assigned comes before what it is assigned to.
-    types: dict[int, str] = {}
-    for node in nodes:
-        match node:
-            case ast.Assign(targets=targets, value=value):
-                types.update((id(target), _type_stored(value, own)) for target in targets)
-            case ast.AugAssign(target=target, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
-                types[id(target)] = _ANYTHING if has_arrays else '+='
-            case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
-                names.setdefault(name, set()).add(types.get(id(node), _ANYTHING))
-            case ast.Call(func=ast.Name(id='setattr') | ast.Attribute(attr='setattr'), args=args):
-                if len(args) <= 1 or not isinstance(args[1], ast.Constant):
-                    return None
-                names.setdefault(str(args[1].value), set()).add(_ANYTHING)
-            case ast.Name(id=name) | ast.Attribute(attr=name):
-                if name in _OPEN or (name == 'setattr' and id(node) not in called):
-                    return None
-    return {name: frozenset(several) for name, several in names.items()}
-
-
-def _type_of_state(
-    value: object, stored: Iterable[Mapping[str, frozenset[str]]], name: str
-) -> str:
-    """Return the type of a name of the state: of its value in the file, and of all that is stored.
-
-    Args:
-        value: The value in the file; `None` if there is none, as nothing is known of it.
-    """
-    types = {type(value).__name__}.union(*(names.get(name, frozenset()) for names in stored))
-    if isinstance(value, float) and types <= {*_NUMBERS, '+=', 'NoneType', _ANYTHING}:
-        # What the file declares as a number is one, whatever computes it.
-        return 'float'
-    if '+=' in types:
-        # A number stays one, with whatever it is added to or multiplied by.
-        types = types - {'+='} | ({'float'} if types & _NUMBERS else {_ANYTHING})
-    types.discard('NoneType')
-    if len(types) == 1 and ':' in ''.join(types):
-        return types.pop()
-    known = types <= {'bool', 'int', 'float', 'str', 'Time'}
-    return ' | '.join(sorted(types)) if known and types else _ANYTHING
-
-
-def _type_stored(value: ast.expr, own: Mapping[str, str]) -> str:
-    match value:
-        case ast.Call(func=ast.Name(id=name)) if name in own:
-            return own[name]
-        case ast.Constant():
-            return type(value.value).__name__
-        case ast.JoinedStr():
-            return 'str'
-        case ast.Compare(ops=[ast.Is() | ast.IsNot() | ast.In() | ast.NotIn(), *_]):
-            return 'bool'
-        case ast.Call(func=ast.Attribute(attr=method), args=[]) if method in _RETURNED:
-            return _RETURNED[method]
-    return _ANYTHING
+    return f'{of_type} | None' if parameter.value is None and of_type != ANYTHING else of_type
 
 
 # Of the methods that send something: the section of what they use, the part of its type that they
@@ -257,15 +177,14 @@ def _overloaded(imports: StubImports, methods: Iterable[str]) -> list[str]:
     return [line for method in several for line in (decorator, method)]
 
 
-def _named(imports: StubImports, of_type: str) -> str:
-    """Return a type with the names by which a stub knows those of `typing`."""
+def named(imports: StubImports, of_type: str) -> str:
+    """Return a type with the names by which a stub knows its classes."""
+    for name in ('Any', 'Literal'):
+        if of_type.startswith(name):
+            return imports.take('typing', name) + of_type.removeprefix(name)
     if ':' in of_type:
         return imports.of(*of_type.split(':'))
-    for name in ('Any', 'Literal', 'Time'):
-        if of_type.startswith(name):
-            alias = imports.take('rclpy.time' if name == 'Time' else 'typing', name)
-            return alias + of_type.removeprefix(name)
-    return of_type
+    return imports.message(of_type) if '/' in of_type else of_type
 
 
 @record
@@ -280,19 +199,17 @@ class _Writer:
         yield from self._state(shape)
         yield from ('', f'class {self.name}({self.imports.take("composer", "Node")}):')
         # Type checkers narrow what is final, as by `is not None`, and no property.
-        yield f'    parameters: {self.imports.take("typing", "Final")}[{self.name}Parameters]'
-        yield from self._property('state', f'{self.name}State')
-        yield from self._property('logger', self.imports.support('Logger'))
+        final = self.imports.take('typing', 'Final')
+        yield f'    parameters: {final}[{self.name}Parameters]'
+        yield f'    state: {final}[{self.name}State]'
+        yield '    @property'
+        yield f'    def logger(self) -> {self.imports.support("Logger")}: ...'
         for method, (section, _, _) in SENDING.items():
             senders = [self._sender(method, *entity) for entity in getattr(shape, section)]
             if not senders:
                 never = self.imports.take('typing', 'Never')
                 senders = [self._method(method, never, f'{never} = ...', 'None')]
             yield from _overloaded(self.imports, senders)
-
-    def _property(self, name: str, of_type: str) -> Iterator[str]:
-        yield '    @property'
-        yield f'    def {name}(self) -> {of_type}: ...'
 
     def _parameters(self, shape: NodeShape) -> Iterator[str]:
         anything = self.imports.take('typing', 'Any')
@@ -335,7 +252,7 @@ class _Writer:
                 yield f'    {name}: {of_type}'
 
     def _union(self, types: Iterable[str]) -> str:
-        several = [_named(self.imports, each) for each in types]
+        several = [named(self.imports, each) for each in types]
         return self.imports.take('typing', 'Any') if 'Any' in types else ' | '.join(several)
 
     def _sender(self, method: str, name: str, types: Sequence[str]) -> str:

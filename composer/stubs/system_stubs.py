@@ -7,9 +7,11 @@ import re
 from importlib import resources
 from typing import TYPE_CHECKING
 
+from composer.stubs.checking.annotated_copies import find_certain_values, find_received_values
 from composer.stubs.message_stubs import SUPPORT, write_packages
-from composer.stubs.node_stubs import find_stored_names, shape_of, write_nodes
+from composer.stubs.node_stubs import shape_of, write_nodes
 from composer.stubs.project_modules import all_nodes, find_project_modules, reach_of
+from composer.stubs.stored_types import find_stored_types
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from composer.node_uses.reading import CreatedEntity
     from composer.stubs.node_stubs import NodeShape
     from composer.stubs.project_modules import ProjectModule
+    from composer.stubs.stored_types import StoredTypes
 
 HEADER = '# Written by `composer stubs`: changes are lost the next time.'
 
@@ -27,7 +30,9 @@ def stubs_of(context: CheckContext) -> dict[str, str]:
     """Return the stubs of a system, by their paths in the folder of stubs."""
     modules = find_project_modules(context)
     module = module_of(context)
-    classes = name_classes(shapes_of(context, modules))
+    given = find_certain_values(find_received_values(context, modules))
+    stored = find_stored_types(context, modules, given)
+    classes = name_classes(shapes_of(context, modules, stored))
     files = dict(write_messages(context, modules))
     # No `.pyi`: pyright warns of a stub without a module, and here there is none.
     files[f'{SUPPORT}/{module}.py'] = text_of(write_nodes(f'{SUPPORT}.{module}', classes))
@@ -82,9 +87,12 @@ def module_of(context: CheckContext) -> str:
     return name if is_free else f'system_{name}'
 
 
-def shapes_of(context: CheckContext, modules: Mapping[str, ProjectModule]) -> dict[str, NodeShape]:
+def shapes_of(
+    context: CheckContext,
+    modules: Mapping[str, ProjectModule],
+    stored: Mapping[str, StoredTypes],
+) -> dict[str, NodeShape]:
     """Return the shapes of a system's nodes, by their keys in the file."""
-    stored = {name: find_stored_names(module.tree, name) for name, module in modules.items()}
     return {
         node.key: shape_of(
             node, [stored[each] for each in reach_of(node, modules)], _created(context, node)

@@ -33,7 +33,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovariance, Twist, Vector3
 
 if TYPE_CHECKING:
     from composer_stubs.payloads import geometry_msgs as payloads
-    from composer_stubs.system import LeftWheel, RightWheel, Rover
+    from composer_stubs.system import Follower, LeftWheel, RightWheel, Rover
 
 
 def tick(node: 'Rover') -> 'payloads.Twist':
@@ -72,6 +72,14 @@ def tick(node: 'Rover') -> 'payloads.Twist':
 def turn(node: 'LeftWheel | RightWheel') -> None:
     node.logger.info(node.name)
     node.publish('status', '')  # error
+
+
+def look(node: 'Follower') -> None:
+    node.state.place.pose  # error
+    if node.state.place is not None and node.state.stamp is not None:
+        node.state.place.pose.position
+        node.state.place.position  # error
+        node.now() - node.state.stamp  # error
 
 
 pose = PoseWithCovariance()
@@ -139,6 +147,18 @@ def test_constants_and_parts_of_interfaces_are_there():
     files = stubs_in(ROOT / 'tests' / 'data' / 'typed' / 'system.yaml')
     text = files['sensor_msgs/msg/__init__.pyi']
     assert '    POWER_SUPPLY_STATUS_UNKNOWN: _ClassVar[int]' in text.splitlines()
+
+
+def test_the_state_has_the_types_of_what_behaviours_store():
+    text = stubs_in(ROOT / 'tests/data/typed/system.yaml')['composer_stubs/system.py']
+    _, _, rest = text.partition('class FollowerState:')
+    for line in (
+        '    place: _geometry_msgs_msg.PoseWithCovariance | None',
+        '    stamp: _builtin_interfaces_msg.Time | None',
+        '    started: _rclpy_time.Time | None',
+        '    mixed: _Any',
+    ):
+        assert line in rest.partition('class Follower(')[0].splitlines()
 
 
 def test_the_command_writes_them_into_typings(tmp_path, monkeypatch, capsys):

@@ -21,6 +21,7 @@ from composer.python_source.modules import FunctionSource
 from composer.python_source.syntax import FUNCTIONS, count_characters, stored_names
 from composer.records import record
 from composer.stubs.message_stubs import StubImports
+from composer.stubs.node_stubs import named
 from composer.stubs.project_modules import all_nodes
 
 if TYPE_CHECKING:
@@ -114,6 +115,20 @@ def find_received_values(
     return functions
 
 
+def find_certain_values(
+    functions: Mapping[FunctionKey, FunctionUse],
+) -> dict[int, dict[str, Value]]:
+    """Return what parameters stand for that are given one type alone, by their functions."""
+    return {
+        id(use.definition): {
+            name: Chain(('node',) if each.nodes else ('made', *each.messages))
+            for name, each in use.received.items()
+            if not each.is_open and bool(each.nodes) + len(each.messages) == 1
+        }
+        for use in functions.values()
+    }
+
+
 def _scopes(module: ProjectModule) -> Iterator[tuple[str, list[ast.stmt]]]:
     yield '', module.tree.body
     for top in module.tree.body:
@@ -137,10 +152,15 @@ class _Edit:
 
 @record
 class AnnotatedCopy:
-    """A module, and the text of its copy with annotations."""
+    """A module, and the text of its copy with annotations.
+
+    Attributes:
+        kept: The types of attributes that are one type wherever they are not `None`.
+    """
 
     module: ProjectModule
     text: str
+    kept: Mapping[str, str]
     _edits: tuple[_Edit, ...]
 
     def original_column(self, line: int, column: int) -> int:
@@ -207,6 +227,7 @@ class Annotator:
 
     functions: Mapping[FunctionKey, FunctionUse]
     name_nodes: Callable[[Iterable[str]], tuple[str, str]]
+    kept: Mapping[str, str]
     _imports: StubImports = field(default_factory=lambda: StubImports(''))
 
     def copy(self, module: ProjectModule) -> AnnotatedCopy:
@@ -217,11 +238,14 @@ class Annotator:
         for (name, _), use in self.functions.items():
             if name == module.name:
                 edits += self._edit(use, lines)
+        for top in module.tree.body:
+            if isinstance(top, ast.ClassDef):
+                edits += self._attributes(top, lines)
         for edit in sorted(edits, reverse=True):
             line = lines[edit.line - 1]
             lines[edit.line - 1] = line[: edit.start] + edit.text + line[edit.end :]
         text = '\n'.join([*lines, *self._imports.lines(), ''])
-        return AnnotatedCopy(module, text, tuple(sorted(edits)))
+        return AnnotatedCopy(module, text, self.kept, tuple(sorted(edits)))
 
     def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
         arguments = use.definition.args
@@ -236,6 +260,20 @@ class Annotator:
         is_free = use.bindings and not use.is_called and use.definition.returns is None
         if is_free and (wanted := self._returned(use)):
             yield from _annotate_return(use.definition, wanted, lines)
+
+    def _attributes(self, of: ast.ClassDef, lines: list[str]) -> Iterator[_Edit]:
+        """Write the types of attributes that begin as `None`."""
+        pending = {*self.kept}
+        for init in (each for each in of.body if getattr(each, 'name', '') == '__init__'):
+            for statement in getattr(init, 'body', []):
+                match statement:
+                    case ast.Assign(
+                        targets=[ast.Attribute(ast.Name('self'), name) as target],
+                        value=ast.Constant(None),
+                    ) if name in pending:
+                        pending.discard(name)
+                        wanted = f'{named(self._imports, self.kept[name])} | None'
+                        yield _after(target, wanted, lines)
 
     def _annotation(self, received: Received) -> str | None:
         if received.is_open or bool(received.nodes) == bool(received.messages):
@@ -275,14 +313,17 @@ class Annotator:
         return ' | '.join([*options, *(['None'] if may_be_none else [])])
 
 
+def _after(node: ast.arg | ast.expr, wanted: str, lines: list[str]) -> _Edit:
+    line = node.end_lineno or node.lineno
+    end = count_characters(lines[line - 1], node.end_col_offset or 0)
+    return _Edit(line, end, end, f": '{wanted}'")
+
+
 def _annotate(
     argument: ast.arg, wanted: str, lines: list[str], *, is_node: bool
 ) -> Iterator[_Edit]:
-    line = argument.lineno
-    text = lines[line - 1]
     if argument.annotation is None:
-        end = count_characters(text, argument.col_offset) + len(argument.arg)
-        yield _Edit(line, end, end, f": '{wanted}'")
+        yield _after(argument, wanted, lines)
         return
     given = argument.annotation
     written = given.value if isinstance(given, ast.Constant) else ast.unparse(given)

@@ -7,12 +7,17 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from composer.stubs.checking.annotated_copies import Annotator, find_received_values
+from composer.stubs.checking.annotated_copies import (
+    Annotator,
+    find_certain_values,
+    find_received_values,
+)
 from composer.stubs.checking.type_checker import run_type_checker
 from composer.stubs.checking.type_findings import TypeFindings
 from composer.stubs.message_stubs import SUPPORT
 from composer.stubs.node_stubs import NodeShape, merge_shapes, write_nodes
 from composer.stubs.project_modules import all_nodes
+from composer.stubs.stored_types import find_stored_types, types_kept
 from composer.stubs.system_stubs import (
     class_name,
     module_of,
@@ -45,8 +50,10 @@ def find_type_errors(
     """
     module = f'{SUPPORT}.{module_of(context)}'
     nodes = {node.key: node for node in all_nodes(context)}
-    classes = _Classes(module, shapes_of(context, modules), nodes)
-    annotator = Annotator(find_received_values(context, modules), classes.of)
+    functions = find_received_values(context, modules)
+    stored = find_stored_types(context, modules, find_certain_values(functions))
+    classes = _Classes(module, shapes_of(context, modules, stored), nodes)
+    annotator = Annotator(functions, classes.of, types_kept(modules, stored))
     copies = {module.path: annotator.copy(module) for module in modules.values()}
     files = dict(write_messages(context, modules))
     shapes = classes.shapes_by_name()

@@ -27,3 +27,25 @@ class Keeper:
         began = self.node.now()
         self.words.append('began ' + (began - self.node.now()))  # error
         return twist
+
+
+class Follower:
+    def __init__(self, node):
+        self.last = None
+        self.mixed = None
+        self.started = None
+
+    def follow(self, node, odometry):
+        self.last = odometry
+        self.mixed = odometry if node.parameters.speed > 1.0 else node.now()
+        self.started = node.now()
+        node.state.place = odometry.pose
+        node.state.stamp = odometry.header.stamp
+
+    def look(self, node):
+        if self.last is None or node.state.stamp is None:
+            return
+        node.logger.info(f'{self.last.pose.pose} {self.mixed.pose}')
+        node.logger.info(f'{(node.now() - self.started).nanosecond}')  # error
+        node.logger.info(f'{node.now() - node.state.stamp}')  # error
+        node.logger.info(f'{node.state.place.pose.position}')
