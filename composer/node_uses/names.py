@@ -246,6 +246,8 @@ class Names:
                 return self._item_of(self.value_of(inner, scope), index)
             case ast.Call():
                 return self._result_of(node, scope)
+            case ast.Lambda():
+                return Function(scope.module, node, None, scope)
         return None
 
     def named(self, name: str, scope: Scope) -> Value | None:

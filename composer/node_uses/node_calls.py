@@ -19,12 +19,12 @@ from composer.node_uses.reading import (
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.modules import read_signature
-from composer.python_source.syntax import is_none, own_nodes
+from composer.python_source.syntax import is_none, own_nodes, positional_names
 from composer.schema.structure import find_problem
 
 if TYPE_CHECKING:
     import inspect
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from composer.node_uses.names import Scope, Value
     from composer.node_uses.reading import Run, Waited
@@ -81,6 +81,28 @@ def explain_misfit(signature: inspect.Signature, call: ast.Call) -> str | None:
     return None
 
 
+def advise_first(names: Sequence[str], given: Sequence[str], own: str) -> str | None:
+    """Return the help for a function that lacks the parameter that should come first.
+
+    Args:
+        names: Those that it takes, without the `own` one of a method.
+        given: What it is called with.
+    """
+    if len(names) >= len(given):
+        return None
+    if own == 'node':
+        return 'add self first'
+    # It may have another name.
+    return None if names and names[0][0] == 'n' else f'add node {own and "after "}{own or "first"}'
+
+
+def called_signature(function: Function) -> inspect.Signature:
+    """Return what a function takes in a call."""
+    signature = read_signature(function.definition.args)
+    parameters = list(signature.parameters.values())
+    return signature.replace(parameters=parameters[function.bound is not None :])
+
+
 def note_call(
     run: Run, method: str, call: ast.Call, scope: Scope, *, is_awaited: bool
 ) -> Iterator[tuple[Function, list[Value | None]]]:
@@ -102,7 +124,10 @@ def note_call(
     if method in SENDING_METHODS:
         _note_sent(run, method, arguments, scope, is_awaited=is_awaited)
     elif method in CREATING_METHODS:
-        yield from _note_created(run, method, arguments, scope)
+        if _are_swapped(run, arguments, scope):
+            run.escape(Chain(('node', method)))
+        else:
+            yield from _note_created(run, method, arguments, scope)
     elif method in ('get_parameters', 'set_parameters'):
         run.reading.reads_others |= method == 'get_parameters'
         _note_remote(run, arguments, scope)
@@ -153,10 +178,49 @@ def _note_created(
         run.use('publisher', named)
         if isinstance(function, Function) and (name := only_text(named)):
             run.reading.payloads += _list_results(function, name, is_certain=run.is_certain)
+    fits = behaviour is None or _check_call(run, noun, behaviour, scope)
     if isinstance(function, Function):
-        yield function, given
+        yield function, given if fits else []
     elif behaviour is not None:
         run.escape(Chain(('node',)))
+
+
+def _are_swapped(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> bool:
+    """Report a function or type that stands where the other argument belongs."""
+    for node in (arguments.get(name) for name in ('period', 'topic', 'srv_name')):
+        value = run.names.value_of(node, scope) if node is not None else None
+        is_type = isinstance(value, External) and find_interface(value.name) is not None
+        if node is not None and (is_type or isinstance(value, Function)):
+            text = f'this is a {"type" if is_type else "function"}, and belongs elsewhere'
+            run.report('bad-call', scope.module, node, text, 'swap the arguments')
+            return True
+    return False
+
+
+def _check_call(run: Run, noun: str, behaviour: ast.expr, scope: Scope) -> bool:
+    """Return whether a behaviour takes what it will be called with, and report it if not."""
+    given = next(
+        each for each in KIND_OF_NOUN[noun].behaviours if each.key == 'behaviour'
+    ).arguments
+    call = ast.Call(behaviour, [], [])
+    if isinstance(behaviour, ast.Call) and behaviour.args:
+        if run.names.value_of(behaviour.func, scope) != External('functools.partial'):
+            return True
+        call = ast.Call(behaviour.args[0], behaviour.args[1:], behaviour.keywords)
+    function = run.names.value_of(call.func, scope)
+    if not isinstance(function, Function):
+        return True
+    call.args += [ast.Name(each) for each in given]
+    call.func = ast.Name(getattr(function.definition, 'name', 'lambda'))
+    signature = called_signature(function)
+    misfit = explain_misfit(signature, call)
+    if misfit is not None:
+        shown = f'{call.func.id}{signature}'.replace('=Ellipsis', '=…')
+        text = f'{shown} is called as {ast.unparse(call)}: {misfit}'
+        own = positional_names(function.definition)[0] if function.bound is not None else ''
+        help_text = advise_first(function.parameters[len(call.args) - len(given) :], given, own)
+        run.report('bad-call', scope.module, behaviour, text, help_text)
+    return misfit is None
 
 
 def _list_results(function: Function, publisher: str, *, is_certain: bool) -> Iterator[Payload]:
@@ -193,6 +257,8 @@ def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> N
     """Note parameters of another node, if the code names both."""
     target = run.names.value_of(arguments['node_name'], scope)
     given = arguments.get('values') or arguments.get('names')
+    if target == Chain(('node', 'name')) and run.is_certain and not run.guards:
+        target = Texts((('', arguments['node_name'], scope.module),))
     if not isinstance(target, Texts) or len(target.options) > 1:
         return
     text, node, module = target.options[0]

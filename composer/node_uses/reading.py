@@ -120,7 +120,8 @@ class RemoteParameter:
     """A parameter that `node.set_parameters` or `node.get_parameters` names.
 
     Attributes:
-        node: The name of its node; `node_place` is where it is written.
+        node: The name of its node, empty for the behaviour's own; `node_place` is where it is
+            written.
         value: What it is set to, if the code shows it; else `None`.
     """
 

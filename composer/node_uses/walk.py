@@ -35,7 +35,6 @@ from composer.node_uses.reading import (
 )
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind
-from composer.python_source.modules import read_signature
 from composer.python_source.syntax import (
     list_arguments,
     list_children,
@@ -207,14 +206,9 @@ class Walk:
         self, function: Function, call: ast.Call, scope: Scope, *, is_waited: bool
     ) -> None:
         """Walk through a function of the project that is called here."""
-        definition = function.definition
-        signature = read_signature(definition.args)
-        parameters = list(signature.parameters.values())
-        if function.bound is not None:
-            signature = signature.replace(parameters=parameters[1:])
-        misfit = node_calls.explain_misfit(signature, call)
+        misfit = node_calls.explain_misfit(node_calls.called_signature(function), call)
         if misfit is not None:
-            name = getattr(definition, 'name', 'the function')
+            name = getattr(function.definition, 'name', 'the function')
             text = f'{name}() is called with other arguments: {misfit}'
             self.run.report('bad-call', scope.module, call, text, None)
             return
@@ -761,7 +755,7 @@ class Walk:
         match chain.path:
             case ('node', 'parameters', name, *_) if name not in _OF_MAPPING:
                 owner = _prefix(node, name)
-                if isinstance(owner, ast.Attribute):
+                if owner is not None:
                     named = Texts(((name, owner, scope.module),))
                     run.use('parameter', named)
             case ('node', 'parameters', _, *_):
@@ -770,7 +764,7 @@ class Walk:
                 owner = _prefix(node, name)
                 if name.startswith('__'):
                     run.reading.is_state_open = True
-                elif isinstance(owner, ast.Attribute):
+                elif owner is not None:
                     run.use_state(name, scope.module, owner)
                     if owner is not node:
                         self.need(owner, scope)
@@ -796,8 +790,10 @@ class Walk:
                     self._unknown('the node', name, known, _prefix(node, name), scope)
 
     def _unknown(
-        self, owner: str, name: str, known: frozenset[str], node: ast.expr, scope: Scope
+        self, owner: str, name: str, known: frozenset[str], node: ast.expr | None, scope: Scope
     ) -> None:
+        if node is None:
+            return
         help_text = suggest(name, known, 'it has')
         if owner == 'the node' and (name in node_calls.OF_RCLPY or name in _ros_members()):
             help_text = node_calls.OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
@@ -1041,10 +1037,10 @@ def _is_question(method: str) -> bool:
     return method.startswith(('count_', 'get_')) and 'parameter' not in method
 
 
-def _prefix(node: ast.expr, name: str) -> ast.expr:
-    """Return the part of a chain of attributes that ends with a name."""
+def _prefix(node: ast.expr, name: str) -> ast.expr | None:
+    """Return the part of a chain of attributes that ends with a name, if it is written there."""
     parts = (part for part in ast.walk(node) if isinstance(part, ast.Attribute))
-    return next((part for part in parts if part.attr == name), node)
+    return next((part for part in parts if part.attr == name), None)
 
 
 def _tests_in(definition: ast.AST) -> list[ast.AST]:

@@ -32,6 +32,7 @@ from composer.python_source.syntax import (
     list_nodes,
     own_nodes,
     parse_source,
+    positional_names,
 )
 from composer.records import record
 
@@ -51,10 +52,12 @@ class FunctionSource:
     Attributes:
         definition: Its syntax tree; `None` if only running the module could tell what it is.
         class_definition: The syntax tree of a class, which can be called as well.
+        first: The name of the parameter that a method has without being given it.
     """
 
     definition: FunctionNode | None = None
     class_definition: ast.ClassDef | None = None
+    first: str = ''
 
     @cached_property
     def kind(self) -> FunctionKind | None:
@@ -370,7 +373,7 @@ def _as_method(node: FunctionNode) -> FunctionSource:
     arguments.posonlyargs, arguments.args = positional[:by_position], positional[by_position:]
     arguments.defaults = arguments.defaults[-len(positional) :] if positional else []
     method.args = arguments
-    return FunctionSource(method)
+    return FunctionSource(method, first=(positional_names(node) or [''])[0])
 
 
 def _describe_constant(value: object) -> str:

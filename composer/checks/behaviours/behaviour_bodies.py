@@ -239,7 +239,7 @@ class _Body:
 
     def _remote_parameter(self, remote: RemoteParameter) -> Iterator[Problem]:
         """Check a parameter that is set or read by name, of a node of this system."""
-        context, name = self.context, remote.node
+        context, name = self.context, remote.node or self.node.name
         meant = name if name.startswith('/') else join_names(self.node.namespace, name)
         nodes = {node.full_name: node for node in context.spec.nodes.values()}
         target = nodes.get(meant)

@@ -10,6 +10,7 @@ from composer.diagnostics import Related, diagnostic_at
 from composer.interfaces.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.language.includes.include_entry import shown_path
+from composer.node_uses.node_calls import advise_first
 from composer.python_source.annotations import Annotation, find_wanted_values, read_annotation
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.module_finder import MissingModule
@@ -67,8 +68,13 @@ def check_behaviour_call(
     binding: Binding,
     kind: FunctionKind | None,
     signature: inspect.Signature | None,
+    first: str = '',
 ) -> Iterator[Diagnostic]:
-    """Check that a function fits its place; a kind or signature of `None` is unknown."""
+    """Check that a function fits its place; a kind or signature of `None` is unknown.
+
+    Args:
+        first: The name of the parameter that a method has beside these.
+    """
     behaviour = binding.behaviour
     if kind is not None and kind.is_generator and not binding.may_yield:
         text = f"'{behaviour.function}' is a generator, and {binding.owner} cannot resume one"
@@ -76,7 +82,7 @@ def check_behaviour_call(
         path, part = behaviour.path, behaviour.function
         yield context.at_value(path, 'generator-not-allowed', text, part=part, help=advice)
     if signature is not None:
-        yield from _check_signature(context, binding, signature)
+        yield from _check_signature(context, binding, signature, first)
 
 
 def _explain_broken_module(
@@ -114,7 +120,8 @@ def _check_source(
         lines = [function.definition.lineno] if function.definition else []
         lines += [function.first_yield] if function.first_yield else []
         places = [Related('it is defined here', module.place_of(line)) for line in lines]
-        for found in check_behaviour_call(context, binding, function.kind, function.signature):
+        shape = (function.kind, function.signature, function.first)
+        for found in check_behaviour_call(context, binding, *shape):
             yield found.with_related(places)
         yield from _check_constructor(context, behaviour, module)
     elif not (module.is_open or module.top.is_dynamic):
@@ -190,7 +197,7 @@ def _explain_missing_function(
 
 
 def _check_signature(
-    context: CheckContext, binding: Binding, signature: inspect.Signature
+    context: CheckContext, binding: Binding, signature: inspect.Signature, first: str
 ) -> Iterator[Diagnostic]:
     behaviour = binding.behaviour
     named: dict[object, list[str]] = {}
@@ -223,7 +230,9 @@ def _check_signature(
     except TypeError as error:
         name, shown = behaviour.function, str(signature).replace('=Ellipsis', '=…')
         text = f'{name}{shown} is called as {binding.call}: {error}'
-        yield context.at_value(behaviour.path, 'bad-signature', text, part=name)
+        names = [each for each in plain if each not in given]
+        advice = advise_first(names, binding.parameters, first)
+        yield context.at_value(behaviour.path, 'bad-signature', text, part=name, help=advice)
 
 
 def _check_values(

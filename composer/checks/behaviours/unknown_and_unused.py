@@ -6,10 +6,12 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from composer.checks.behaviours.behaviour_bodies import bound_at, readings_of
+from composer.checks.behaviours.behaviour_functions import is_called_wrongly
 from composer.checks.parameters import OF_EVERY_NODE
 from composer.diagnostics import diagnostic_at
 from composer.entity_kinds import KIND_OF_NOUN, USED_KINDS
 from composer.language.specs import NodeSpec
+from composer.node_uses.reading import SENDING_METHODS
 from composer.spelling import find_nearest, is_short, is_typo, suggest
 
 if TYPE_CHECKING:
@@ -37,9 +39,20 @@ def check_uses(context: CheckContext) -> Iterator[Diagnostic]:
         (node, [found for _, found in uses[name]])
         for name, node in context.spec.nodes.items()
         # What is left out of a node, or has an error, may use the rest of it.
-        if name not in lost and partial.get(name, node) is node
+        if name not in lost
+        and partial.get(name, node) is node
+        and not _is_broken(context, uses[name])
     ]
     yield from _check_unused(context, whole)
+
+
+def _is_broken(context: CheckContext, uses: list[tuple[Binding, Reading]]) -> bool:
+    """Return whether a behaviour does not have its node."""
+    return any(
+        is_called_wrongly(context, binding)
+        or any(each.message == "'node' is not defined" for each in reading.problems)
+        for binding, reading in uses
+    )
 
 
 def _lost_by_node(context: CheckContext) -> dict[str, list[DataPath]]:
@@ -168,9 +181,23 @@ def _explain_name(
     if use.is_optional:
         rule, message = 'missing-parameter', f'{message}, so this is None'
     known, otherwise = getattr(node, kind.section), f"declare it under '{kind.section}:'"
-    advice = suggest(use.name, known, 'it declares', otherwise)
+    advice = _advise_method(node, use) or suggest(use.name, known, 'it declares', otherwise)
     related = [bound_at(context, binding)]
     return diagnostic_at(use.place, rule, message, help=advice, related=related)
+
+
+def _advise_method(node: NodeSpec, use: NodeUse) -> str | None:
+    """Return the help for a name of something that another method of the node takes."""
+    for noun, kind in KIND_OF_NOUN.items():
+        if (
+            use.kind != 'parameter'
+            and noun != 'parameter'
+            and use.name in getattr(node, kind.section)
+        ):
+            method = next((each for each, of in SENDING_METHODS.items() if of == noun), '')
+            a = 'an' if noun[0] in 'aeiou' else 'a'
+            return f'it is {a} {noun}{method and ": use node."}{method}'
+    return None
 
 
 def _check_unused(
@@ -228,6 +255,9 @@ def _meant(node: NodeSpec, used: set[tuple[str, str]]) -> Iterator[tuple[str, st
         declared = getattr(node, KIND_OF_NOUN[kind].section)
         if name and name not in declared and not _is_of_ros(kind, name):
             near = find_nearest(name, declared)
+            yield from (
+                (each.noun, name) for each in USED_KINDS if 'parameter' not in (kind, each.noun)
+            )
             yield from ((kind, each) for each in (declared if near is None else (near,)))
 
 
