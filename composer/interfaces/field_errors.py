@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias
 from composer.errors import ComposerError
 from composer.interfaces.classes import interface_name, is_message_class
 from composer.interfaces.descriptions import FieldType
-from composer.spelling import suggest
+from composer.spelling import did_you_mean, suggest
 
 FieldRule: TypeAlias = Literal[
     'unknown-field',
@@ -62,10 +62,12 @@ class FieldError(ComposerError):
         return self
 
 
-def unknown_field(message_name: str, key: object, names: Iterable[str]) -> FieldError:
+def unknown_field(
+    message_name: str, key: object, names: Iterable[str], meant: str | None = None
+) -> FieldError:
     """Return the error for a key that is no field of its message."""
     names = tuple(names)
-    advice = suggest(key, names)
+    advice = did_you_mean(meant, suggest(key, names))
     if message_name.endswith('.Goal') and key in _OF_GOAL_HANDLES:
         advice = f'{_OF_GOAL_HANDLES[str(key)]};'
     fields = f'its fields are {", ".join(names)}' if names else 'it has no fields'

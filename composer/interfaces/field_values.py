@@ -40,6 +40,7 @@ INTEGER_RANGES: Final = {
 # The greatest finite single-precision number (IEEE 754 binary32).
 FLOAT32_MAX: Final = (2 - 2**-23) * 2.0**127
 BYTES: Final = tuple(bytes([number]) for number in range(256))
+IN_QUOTES: Final = 'put it in quotes'
 OCTET_KINDS: Final = frozenset({'byte', 'char', 'uint8'})
 
 
@@ -192,7 +193,7 @@ def _string_reader(expected: FieldType) -> Reader:
     def read(value: object) -> object:
         if not isinstance(value, str):
             scalar = isinstance(value, bool | int | float)
-            raise wrong_type(expected, value, 'put it in quotes' if scalar else None)
+            raise wrong_type(expected, value, IN_QUOTES if scalar else None)
         if not wide and '\0' in value:
             message = f'expected {expected}, got text with a NUL character'
             advice = 'ROS would cut the text off there'

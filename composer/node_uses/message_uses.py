@@ -9,12 +9,13 @@ import ast
 import operator
 import re
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from composer.errors import ComposerError
-from composer.interfaces.descriptions import FieldType, MessageDescription
+from composer.interfaces.descriptions import FieldDescription, FieldType, MessageDescription
 from composer.interfaces.field_errors import FieldError, format_field_error, unknown_field
-from composer.interfaces.field_values import check_length
+from composer.interfaces.field_values import IN_QUOTES, check_length
 from composer.interfaces.message_types import in_python
 from composer.interfaces.payload_checks import check_payload
 from composer.node_uses.reading import Problem
@@ -23,14 +24,14 @@ from composer.spelling import find_nearest, suggest
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from composer.interfaces.descriptions import FieldDescription
     from composer.interfaces.message_types import MessageTypes
     from composer.node_uses.reading import MessageUse, Reading, Wire
     from composer.python_source.modules import ModuleSource
 
+_OF_TYPO = re.compile(r"did you mean '\w+'")
 _INDEX = re.compile(r'\[(\d+)\]')
 _OF_CLASSES = ('get_fields_and_field_types', 'SLOT_TYPES')
-# Of types, type checkers know.
+# Of types, type checkers know, but not of those of some items.
 _OF_VALUES = ('field-length', 'field-range')
 _OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -85,6 +86,17 @@ def shown_value(node: ast.expr) -> object:
     with suppress(NotLiteralError):
         return literal_of(node)
     return None
+
+
+def advise_text(value: ast.expr) -> str:
+    """Return the help for a number or a bool where a text is wanted."""
+    return f'write {str(value.value)!r}' if isinstance(value, ast.Constant) else 'write str(…)'
+
+
+def advise_float(value: ast.expr) -> str:
+    """Return the help for an integer where a float is wanted."""
+    number = shown_value(value)
+    return f'write it as a float: {float(number)}' if isinstance(number, int) else 'write float(…)'
 
 
 def find_problems(
@@ -144,9 +156,14 @@ class _Payloads:
         else:
             with suppress(NotLiteralError):
                 data = {field.name: literal_of(value)}
-                yield from self._literal(description, value, data)
+                yield from self._literal(replace(description, fields=(field,)), value, data)
                 return
-            if items and field.type.array and not any(isinstance(i, ast.Starred) for i in items):
+            is_open = any(isinstance(item, ast.Starred) for item in items)
+            for index, item in enumerate(items if field.type.array else ()):
+                name = field.name if is_open else f'{field.name}[{index}]'
+                of_item = FieldDescription(name, field.type.item)
+                yield from self.field(description, of_item, item)
+            if items and field.type.array and not is_open:
                 try:
                     check_length(field.type, len(items))
                 except FieldError as error:
@@ -159,7 +176,9 @@ class _Payloads:
         for finding in check_payload(description, data, self._types.catalogue):
             place = self._module.span_of(value)
             message = finding.message.replace(description.name, in_python(description.name))
-            yield Problem(finding.rule, message, place, finding.help)
+            is_text = finding.help == IN_QUOTES and isinstance(value, ast.Constant)
+            help_text = advise_text(value) if is_text else finding.help
+            yield Problem(finding.rule, message, place, help_text)
 
 
 def check_message_uses(
@@ -175,7 +194,7 @@ def check_message_uses(
         description = types.describe(type_name) if type_name else None
         problem = _find_problem(types, description, use) if description else None
         if problem is not None:
-            if use.is_certain or (problem.help or '').startswith('did you mean'):
+            if use.is_certain or _OF_TYPO.match(problem.help or ''):
                 yield problem
         elif use.is_write and wire.is_read_only and use.of_type is None:
             text = 'this writes to a message that a read_only subscription shares with others'
@@ -188,19 +207,27 @@ def _find_problem(
     types: MessageTypes, description: MessageDescription, use: MessageUse
 ) -> Problem | None:
     found: FieldType | MessageDescription | None = description
-    for name in use.path:
+    for position, name in enumerate(use.path, start=1):
+        written = _part_of(use.node, len(use.path) - position)
         if isinstance(found, MessageDescription) and name[0] != '[':
             field = found.field(name)
             if field is None:
-                wrong, place = explain_unknown(types, found, name), use.module.span_of(use.node)
-                place = place if place.text == name else place.narrowed_to(name)
-                return Problem('unknown-field', wrong[0], place, wrong[1]) if wrong else None
+                wrong = explain_unknown(types, found, name)
+                # What is kept under another name is found where that gets it.
+                is_here = use.node is use.value or getattr(written, 'attr', '') == name
+                if wrong is None or not is_here:
+                    return None
+                return Problem('unknown-field', wrong[0], use.module.span_of(written), wrong[1])
             if use.value is not None and name is use.path[-1]:
                 problems = _Payloads(types, use.module).field(found, field, use.value)
-                return next((each for each in problems if each.rule in _OF_VALUES), None)
+                whole = use.module.span_of(use.value)
+                known = (
+                    each for each in problems if each.rule in _OF_VALUES or each.place != whole
+                )
+                return next(known, None)
             found = field.type
         elif isinstance(found, FieldType) and found.array and name[0] == '[':
-            problem = _wrong_index(found, name, use)
+            problem = _wrong_index(found, name, written, use.module)
             if problem is not None:
                 return problem
             found = found.item
@@ -211,14 +238,24 @@ def _find_problem(
     return None
 
 
-def _wrong_index(array: FieldType, name: str, use: MessageUse) -> Problem | None:
+def _part_of(node: ast.AST, count: int) -> ast.AST:
+    """Return the part of a chain of attributes and items before the last ones."""
+    for _ in range(count):
+        node = node.value if isinstance(node, ast.Attribute | ast.Subscript) else ast.Pass()
+    return node
+
+
+def _wrong_index(
+    array: FieldType, name: str, written: ast.AST, module: ModuleSource
+) -> Problem | None:
     match = _INDEX.fullmatch(name)
     bound = array.array_bound if array.array == 'fixed' else None
     if match is None or bound is None or int(match[1]) < bound:
         return None
+    if not isinstance(written, ast.Subscript):
+        return None
     text = f'there is no item {match[1]}: this has {bound}, from 0 to {bound - 1}'
-    index = next(each for each in ast.walk(use.node) if isinstance(each, ast.Subscript)).slice
-    return Problem('bad-index', text, use.module.span_of(index))
+    return Problem('bad-index', text, module.span_of(written.slice))
 
 
 def explain_unknown(
@@ -233,5 +270,9 @@ def explain_unknown(
             return None
         if find_nearest(name, known):
             return f"{shown} has no constant '{name}'", suggest(name, known, 'it has')
-    error = unknown_field(shown, name, [each.name for each in owner.fields])
+    singles = [each for each in owner.fields if each.type.nested and not each.type.array]
+    parts = [(each.name, types.describe(each.type.nested or '')) for each in singles]
+    having = [f'{of}.{name}' for of, part in parts if part and part.field(name)]
+    meant = having[0] if len(having) == 1 else None
+    error = unknown_field(shown, name, [each.name for each in owner.fields], meant)
     return str(error), error.help

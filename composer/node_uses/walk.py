@@ -218,8 +218,6 @@ class Walk:
             value = self._names.value_of(node, scope)
             if is_open or not isinstance(value, Chain) or value not in given.values():
                 self.visit(node, scope)
-            elif value.path[0] in ('message', 'made'):
-                self._use_message(value, node, scope)
             else:
                 self._note_read(value, node, scope)
         self.run.calls.append(scope.module.span_of(call))
@@ -728,9 +726,6 @@ class Walk:
         self, chain: Chain, node: ast.Name | ast.Attribute | ast.Subscript, scope: Scope
     ) -> None:
         """Note a use of something that the behaviour is given, outside a call of it."""
-        if chain.path[0] in ('message', 'made'):
-            self._use_message(chain, node, scope)
-            return
         is_stored = not isinstance(node.ctx, ast.Load)
         match chain.path:
             case ('node', 'state', name) if is_stored:
@@ -753,6 +748,8 @@ class Walk:
     def _note_read(self, chain: Chain, node: ast.expr, scope: Scope) -> None:
         run = self.run
         match chain.path:
+            case ('message' | 'made', *_):
+                self._use_message(chain, node, scope)
             case ('node', 'parameters', name, *_) if name not in _OF_MAPPING:
                 owner = _prefix(node, name)
                 if owner is not None:
@@ -810,7 +807,7 @@ class Walk:
 
     def _use_message(self, chain: Chain, node: ast.expr, scope: Scope) -> None:
         run = self.run
-        is_write = not isinstance(getattr(node, 'ctx', None), ast.Load)
+        is_write = isinstance(getattr(node, 'ctx', None), ast.Store | ast.Del)
         of_type = chain.path[1] if chain.path[0] == 'made' else None
         path = chain.path[2 if of_type else 1 :]
         is_guarded = run.guards or run.broad_guards or run.fixed

@@ -96,6 +96,30 @@ def test_a_message_that_is_passed_on_to_another_type_is_found(typed):
     assert finding.message.endswith('expected int32, got std_msgs/msg/String')
 
 
+def test_the_help_writes_the_value_of_the_code(typed):
+    Path('small.py').write_text(
+        'from geometry_msgs.msg import Point\nfrom std_msgs.msg import String\n\n\n'
+        'def tick(node):\n'
+        '    a = b = Point()\n'
+        '    a.x = b.y = -3\n'
+        '    b.z = len(node.name)\n'
+        '    String(data=5)\n'
+        '    return len(node.name)\n'
+    )
+    Path('small.yaml').write_text(
+        'version: 1\nnodes:\n  n:\n'
+        '    publishers: {out: {type: std_msgs/msg/String, external: true}}\n'
+        '    timers: {tick: {period: 1.0, behaviour: small:tick, publish: out}}\n'
+    )
+    found = [(each.span.text, each.help) for each in find_by_types(Path('small.yaml'))]
+    assert found == [
+        ('-3', 'write it as a float: -3.0'),
+        ('len(node.name)', 'write float(…)'),
+        ('5', "write '5'"),
+        ('len(node.name)', 'write str(…)'),
+    ]
+
+
 def test_pyrefly_checks_a_right_system_again_only_after_a_change(typed, monkeypatch):
     clean = Path('behaviour.py')
     clean.write_text("def tick(node):\n    node.publish('status', 'on')\n")

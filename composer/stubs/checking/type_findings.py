@@ -17,7 +17,7 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
-from composer.node_uses.message_uses import explain_unknown
+from composer.node_uses.message_uses import advise_float, advise_text, explain_unknown
 from composer.node_uses.names import (
     Chain,
     Class,
@@ -411,6 +411,10 @@ class TypeFindings:
         if not place.values:
             return None
         value, match = place.values[0], _MESSAGE.match(function)
+        for each in place.around:
+            # As in `a.x = b.x = 1`.
+            if isinstance(each, ast.Assign) and value in each.targets:
+                value = each.value
         if match is not None:
             field = parameter if match[4] == '__init__' else match[4]
             description = self.context.types.describe(f'{match[1]}/{match[2]}/{match[3]}')
@@ -584,7 +588,13 @@ class TypeFindings:
         if fits and not is_wrong:
             return None
         is_int = is_stored and names == {'int'} and field.type.kind in _FLOATS
-        advice = 'write it as a float: 1.0' if is_int else None
+        advice = advise_float(value) if is_int else None
+        if (
+            names
+            and names <= {'bool', 'float', 'int'}
+            and field.type.kind in ('string', 'wstring')
+        ):
+            advice = advise_text(value)
         advice = 'write .to_msg()' if given in _TIMES else advice
         path = f'{in_python(description.name)}: {name}'
         expected = in_python(field.type.nested) if field.type.nested else str(field.type)

@@ -166,6 +166,9 @@ WRONG = {
     'one, two = node.parameters.unset': 'no-value',
     'for each in node.parameters.unset: print(each)': 'no-value',
     'print(m.pose.covariance[36])': 'bad-index',
+    'kept = m.pose.covariance[36]; print(kept, kept)': 'bad-index',
+    "node.publish('scan', {'ranges': [m.pose.pose.position.x, 'x']})": 'field-type',
+    "node.publish('scan', {'ranges': [*m.pose.covariance, 'x' if m.pose else 1.0]})": 'field-type',
     "node.publish('level', 256)": 'field-range',
     "node.publish('cover', {'pose': {'covariance': [0.0] * 6}})": 'field-length',
     "node.publish('level', 'x' if m.pose else 1)": 'field-type',
@@ -273,6 +276,16 @@ def test_what_is_wrong_is_found_in_its_line(check, line, rule):
 def test_what_may_be_right_has_no_finding(check, line):
     _, found = check_line(check, line)
     assert found == []
+
+
+@pytest.mark.ros
+def test_a_wrong_name_is_found_once_where_it_is_written(check):
+    body = 'def show(it): print(it.x)\ndef hear(node, m):\n    use(node)\n    kept = m.pose.position\n'
+    code = f'{HEAD}{body}    kept.x = 1.0\n    print(m.pose.positio.y)\n    show(kept)\n{USE_ALL}'
+    first, second = check(SYSTEM, code, rule='unknown-field', tells='span')
+    assert (first.text, second.text) == ('position', 'positio')
+    helped = check(SYSTEM, code, rule='unknown-field', tells='help')
+    assert helped[0] == "did you mean 'pose.position'? its fields are pose, covariance"
 
 
 def test_a_comment_in_python_silences_a_finding(check):
