@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -152,16 +152,34 @@ class _Edit:
 
 @record
 class AnnotatedCopy:
-    """A module, and the text of its copy with annotations.
+    """A module, and the changes that make its annotated copy.
 
     Attributes:
         kept: The types of attributes that are one type wherever they are not `None`.
     """
 
     module: ProjectModule
-    text: str
     kept: Mapping[str, str]
     _edits: tuple[_Edit, ...]
+    _end: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The text of the copy."""
+        lines = list(self.module.source.lines)
+        for edit in reversed(self._edits):
+            line = lines[edit.line - 1]
+            lines[edit.line - 1] = line[: edit.start] + edit.text + line[edit.end :]
+        return '\n'.join([*lines, *self._end, ''])
+
+    def revealing(self, values: Iterable[ast.expr]) -> AnnotatedCopy:
+        """Return a copy that has the types of values reported, as `typing.reveal_type` does."""
+        edits = [*self._edits]
+        for value in values:
+            (line, column), (end_line, end) = self.start(value), self.end(value)
+            edits.append(_Edit(line, column - 1, column - 1, 'reveal_type('))
+            edits.append(_Edit(end_line, end - 1, end - 1, ')'))
+        return replace(self, _edits=tuple(sorted(edits)))
 
     def original_column(self, line: int, column: int) -> int:
         """Return the column, from 1, in the original, of one in the copy."""
@@ -241,11 +259,7 @@ class Annotator:
         for top in module.tree.body:
             if isinstance(top, ast.ClassDef):
                 edits += self._attributes(top, lines)
-        for edit in sorted(edits, reverse=True):
-            line = lines[edit.line - 1]
-            lines[edit.line - 1] = line[: edit.start] + edit.text + line[edit.end :]
-        text = '\n'.join([*lines, *self._imports.lines(), ''])
-        return AnnotatedCopy(module, text, self.kept, tuple(sorted(edits)))
+        return AnnotatedCopy(module, self.kept, tuple(sorted(edits)), tuple(self._imports.lines()))
 
     def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
         arguments = use.definition.args

@@ -10,7 +10,7 @@ import itertools
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
-from composer.python_source.syntax import FUNCTIONS, SCOPES, words_in
+from composer.python_source.syntax import FUNCTIONS, SCOPES, list_children, owner_of, words_in
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 
 # What asks what a value is.
 _TESTS = frozenset({'hasattr', 'isinstance', 'issubclass', 'callable', 'type'})
-# What may not run, or catch errors of what is in it.
-_CONDITIONS = (ast.If, ast.IfExp, ast.BoolOp, ast.While, ast.Match, ast.Try, ast.With)
+# What has no places of its own, and what is no value that can be asked for.
+_NOT_ASKED = (ast.JoinedStr, ast.Lambda, ast.arguments)
+_NOT_VALUES = (
+    *(ast.Constant, ast.Dict, ast.Lambda, ast.List, ast.NamedExpr, ast.Set, ast.Slice),
+    *(ast.Starred, ast.Tuple, ast.Yield, ast.YieldFrom),
+)
+# What may catch errors of what is in it, or hold for some types alone.
+_CATCHING = (ast.Match, ast.Try, ast.TryStar, ast.With)
 
 
 @record
@@ -73,6 +79,28 @@ class ReportedPlace:
         return chain
 
     @property
+    def parts(self) -> list[ast.expr]:
+        """The values in the statement that the report is in, or in its head."""
+        inner = next((each for each in self.around if isinstance(each, ast.stmt)), None)
+        heads = [] if inner is None else list_children(inner)
+        pending = [each for each in heads if not isinstance(each, ast.stmt)]
+        # Whose attribute is missing; other parts of a chain have to stay together, for what is
+        # known of the whole.
+        is_missing = self.report.kind == 'missing-attribute'
+        named = [each for each in self.values if isinstance(each, ast.Attribute)]
+        found: list[ast.expr] = [each.value for each in named if is_missing]
+        while pending:
+            node = pending.pop()
+            if isinstance(node, ast.Call):
+                pending += [*node.args, *node.keywords, *list_children(node.func)]
+            elif not isinstance(node, _NOT_ASKED) and not _is_chain(node):
+                pending += list_children(node)
+            is_read = isinstance(getattr(node, 'ctx', ast.Load()), ast.Load)
+            if isinstance(node, ast.expr) and is_read and not isinstance(node, _NOT_VALUES):
+                found.append(node)
+        return found
+
+    @property
     def function(self) -> FunctionNode | None:
         """The function that the report is in."""
         return next((node for node in self.around if isinstance(node, FUNCTIONS)), None)
@@ -114,8 +142,14 @@ class ReportedPlace:
         """As of a `Walk`; what no behaviour comes to is left alone on any condition."""
         inside = [*itertools.takewhile(lambda node: not isinstance(node, SCOPES), self.around)]
         known = [self.places[id(node)] for node in inside if id(node) in self.places]
-        is_conditional = any(isinstance(node, _CONDITIONS) for node in inside)
-        return known[0] if known else (is_conditional, is_conditional, True)
+        if known:
+            return known[0]
+        is_caught = any(isinstance(node, _CATCHING) for node in inside)
+        tests = [
+            getattr(node, 'test', None) or getattr(node, 'values', [None])[0] for node in inside
+        ]
+        words = words_in(*(test for test in tests if isinstance(test, ast.expr)))
+        return is_caught, bool(words & (_TESTS | {'parameters', 'name'})), True
 
 
 # Reports come a function after the other.
@@ -128,3 +162,7 @@ def _asked_in(function: FunctionNode) -> frozenset[str]:
         if isinstance(node, ast.Call) and getattr(node.func, 'id', '') in _TESTS
         for name in words_in(*node.args)
     )
+
+
+def _is_chain(node: ast.AST) -> bool:
+    return isinstance(node, ast.expr) and isinstance(owner_of(node), ast.Name)

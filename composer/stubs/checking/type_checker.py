@@ -59,6 +59,8 @@ class TypeReport(NamedTuple):
     path: str
     line: int
     column: int
+    end_line: int
+    end_column: int
     kind: str
     message: str
 
@@ -70,10 +72,19 @@ def find_program() -> Path | None:
     return Path(found) if found else None
 
 
+def version_of(program: Path) -> str:
+    """Return the version of pyrefly.
+
+    Raises:
+        TypeCheckerError: Pyrefly does not work.
+    """
+    return _run(program, ['--version']).strip().removeprefix('pyrefly ')
+
+
 def run_type_checker(
     program: Path, modules: Mapping[str, str], stubs: Mapping[str, str]
-) -> tuple[str, list[TypeReport]]:
-    """Return the version of pyrefly, and what it reports of modules; texts are by their paths.
+) -> list[TypeReport]:
+    """Return what pyrefly reports of modules; texts are by their paths.
 
     Raises:
         TypeCheckerError: Pyrefly does not work.
@@ -97,9 +108,8 @@ def run_type_checker(
     except (ValueError, KeyError) as error:
         message = f'pyrefly does not work: it printed {text.strip()[-200:]!r}'
         raise TypeCheckerError(message) from error
-    keys = ('path', 'line', 'column', 'name', 'description')
-    version = _run(program, ['--version']).strip().removeprefix('pyrefly ')
-    return version, [TypeReport(*(report[key] for key in keys)) for report in reports]
+    keys = ('path', 'line', 'column', 'stop_line', 'stop_column', 'name', 'description')
+    return [TypeReport(*(report[key] for key in keys)) for report in reports]
 
 
 def _run(program: Path, arguments: list[str], folder: Path | None = None) -> str:

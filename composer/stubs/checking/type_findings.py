@@ -6,51 +6,40 @@ A report that says nothing certain of a node or a message is none.
 from __future__ import annotations
 
 import ast
-import builtins
 import re
-import sys
-from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, TypeAlias
 
 from composer.diagnostics import Span, diagnostic_at
+from composer.interfaces.descriptions import FieldType
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
 from composer.node_uses.message_uses import advise_float, advise_text, explain_unknown
 from composer.node_uses.names import (
     Chain,
-    Class,
-    External,
-    Instance,
-    Names,
-    Scope,
-    find_stored,
 )
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import (
     list_arguments,
     owner_of,
-    positional_names,
     stored_names,
     words_in,
 )
 from composer.records import record
-from composer.spelling import did_you_mean, is_typo, suggest
+from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.stubs.checking.left_alone import ReportedPlace
+from composer.stubs.checking.origins import INTERFACE, OF_PYTHON, Origins
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
-    from composer.interfaces.descriptions import FieldType, MessageDescription
+    from composer.interfaces.descriptions import MessageDescription
     from composer.language.specs import NodeSpec
-    from composer.node_uses.names import Value
-    from composer.python_source.module_finder import ModuleFinder
-    from composer.python_source.syntax import FunctionNode
     from composer.stubs.checking.annotated_copies import (
         AnnotatedCopy,
         FunctionKey,
@@ -74,21 +63,21 @@ _KEYWORD = re.compile(r'Unexpected keyword argument `(\w+)`')
 _MEANT = re.compile(r'Did you mean `(\w+)`')
 _MESSAGE = re.compile(r'^(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)$')
 _LITERAL = re.compile(r"Literal\[('[^']*'|-?\d+|True|False|b'[^']*')\]")
-_DICT = re.compile(r'^dict\[str, (.*)\]$')
-# A time of rclpy, which a message has beside it.
-_TIME = re.compile(r'^rclpy\.\w+\.(Time|Duration)$')
-_TIME_MESSAGE = re.compile(r'^builtin_interfaces\.msg\.(\w+)$')
+_TIME = re.compile(r'^rclpy\.\w+\.Rclpy(Time|Duration)\.__init__$')
+_OVERLOADED = re.compile(r'No matching overload found for function `([\w.]+)`')
 _UNARY = re.compile(r'Type `([^`]+)` is not iterable')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
-_ITEMS = re.compile(r'(?:list|set|tuple)\[([^\[\],]+)\]')
 _INDEXED = re.compile(r'Cannot (?:index into|set item in) `(\w+)[^`]*`')
-# A value that no plain field takes.
-_COLLECTION = re.compile(r'(?:dict|list|set|tuple)\[[^|]*\]')
+_PARTS_OF_INTERFACES = {
+    'msg': (),
+    'srv': ('Request', 'Response', 'Event'),
+    'action': ('Goal', 'Result', 'Feedback'),
+}
 _PARTS = {
     'Logger': 'the logger',
     'Goal': 'a goal',
-    'Time': 'a time',
-    'Duration': 'a duration',
+    'RclpyTime': 'a time of rclpy',
+    'RclpyDuration': 'a duration of rclpy',
     'End': 'a subscription',
     'Publisher': 'a publisher',
 }
@@ -97,92 +86,30 @@ _TAKEN = {
     'behaviour': 'a function',
     'qos': 'a depth, the name of a profile, a mapping or a QoSProfile',
 }
-_INTERFACE = re.compile(r'\.(msg|srv|action)\.')
-_DISPLAYS = (ast.Dict, ast.List, ast.ListComp, ast.Tuple)
 _FLOATS = ('float32', 'float64')
 _SCALARS = frozenset({'bool', 'bytes', 'float', 'int', 'str'})
-_TIMES = frozenset({'Time', 'Duration'})
-_TIME_MESSAGES = {f'msg.{each}': f'builtin_interfaces/msg/{each}' for each in sorted(_TIMES)}
-# Functions and modules whose types are those of Python itself.
-_OF_PYTHON = frozenset({*dir(builtins), *sys.stdlib_module_names})
+_TYPES_OF_DISPLAYS: dict[type, str] = {
+    ast.Dict: 'dict',
+    ast.List: 'list',
+    ast.Set: 'set',
+    ast.Tuple: 'tuple',
+    ast.JoinedStr: 'str',
+}
+# The times of rclpy, as the stubs call them, and the messages that they make.
+_TIMES = {f'Rclpy{each}': f'builtin_interfaces/msg/{each}' for each in ('Time', 'Duration')}
+# What makes something else of an object.
+_CONVERTING = {
+    '__array__',
+    '__float__',
+    '__getitem__',
+    '__index__',
+    '__int__',
+    '__iter__',
+    'to_msg',
+}
+_COLLECTIONS = frozenset({'array', 'dict', 'frozenset', 'list', 'NDArray', 'set', 'tuple'})
 # Classes of Python, of which fields and parameters are.
 _PLAIN_OWNERS = _SCALARS | {'array', 'list', 'Mapping'}
-
-
-class _Origins(Names):
-    """What names stand for, also of what methods and sums give, and of items of anything."""
-
-    def __init__(self, finder: ModuleFinder, functions: Iterable[FunctionUse]) -> None:
-        super().__init__(finder)
-        self._uses = {id(use.definition): use for use in functions}
-
-    def find(self, place: ReportedPlace, value: ast.expr) -> Value | None:
-        """Return what a value stands for at the place of a report."""
-        scope = Scope(place.copy.module.source)
-        for index, node in reversed([*enumerate(place.around)]):
-            match node:
-                case ast.FunctionDef() | ast.AsyncFunctionDef():
-                    classes = (each for each in place.around if isinstance(each, ast.ClassDef))
-                    of = next(classes, None)
-                    instance = Instance(Class(scope.module, of)) if of else None
-                    scope = Scope(scope.module, node, self._given_in(node, instance), scope)
-                case ast.Lambda():
-                    given = self._given_to(node, place.around[index:], scope)
-                    scope = Scope(scope.module, node, given, scope)
-                case ast.For(target=target) if not stored_names(target) & {*find_stored(node)}:
-                    scope = _inside(ast.For(target, node.iter, [], []), scope)
-                case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
-                    scope = _inside(node, scope)
-        return self.value_of(value, scope)
-
-    def _given_in(self, method: FunctionNode, instance: Instance | None) -> dict[str, Value]:
-        use = self._uses.get(id(method))
-        own = dict.fromkeys(positional_names(method)[:1], instance)
-        return {name: each for name, each in own.items() if each} | (use.given if use else {})
-
-    def _given_to(
-        self, function: ast.Lambda, around: Sequence[ast.AST], scope: Scope
-    ) -> dict[str, Value]:
-        """Return what a function of one parameter is called with, if that is known."""
-        call = next((each for each in around if isinstance(each, ast.Call)), None)
-        match call, positional_names(function):
-            case (
-                ast.Call(
-                    func=ast.Name(id='filter' | 'map' | 'max' | 'min' | 'sorted'),
-                    args=[*first, items],
-                ),
-                [name],
-            ) if first in ([], [function]):
-                item = self._item_of(self.value_of(items, scope))
-                return {name: item} if item else {}
-        return {}
-
-    def _value_of(self, node: ast.expr, scope: Scope) -> Value | None:
-        match node:
-            case ast.Await(value=inner):
-                return self.value_of(inner, scope)
-            case ast.BinOp(left=left):
-                # A time plus something is a time.
-                origin = self.value_of(left, scope)
-                is_time = isinstance(origin, Chain) and origin.path[-2:] == ('now', '()')
-                return origin if is_time else None
-        return super()._value_of(node, scope)
-
-    def _result_of(self, call: ast.Call, scope: Scope) -> Value | None:
-        function = self.value_of(call.func, scope)
-        if isinstance(function, Chain):
-            return Chain((*function.path, '()'))
-        return super()._result_of(call, scope)
-
-    def _item_of(self, owner: Value | None, _index: ast.expr | None = None) -> Value | None:
-        return Chain((*owner.path, '[]')) if isinstance(owner, Chain) else None
-
-
-def _inside(loop: ast.AST, scope: Scope) -> Scope:
-    """Return the scope of a loop, as that of a function without parameters."""
-    no_arguments = ast.arguments([], [], None, [], [], None, [])
-    function = ast.Lambda(no_arguments, cast('ast.expr', loop))
-    return Scope(scope.module, function, {}, scope)
 
 
 @record
@@ -197,6 +124,10 @@ class TypeFindings:
         own: The names that the project itself defines, or imports from elsewhere.
         modules: The names of its modules.
         defined: What it gives to classes and objects; with an empty text, any name.
+        stored: The attributes of these alone.
+        closed: Its classes that have what is written out alone.
+        bases: What its classes inherit from.
+        types: Those of values that were asked for, by the identities of their syntax trees.
     """
 
     context: CheckContext
@@ -207,10 +138,49 @@ class TypeFindings:
     own: frozenset[str]
     modules: frozenset[str]
     defined: frozenset[str]
+    stored: frozenset[str]
+    closed: Mapping[str, ast.ClassDef]
+    bases: frozenset[str]
+    types: dict[int, str]
 
     @cached_property
-    def _origins(self) -> _Origins:
-        return _Origins(self.context.modules, self.functions.values())
+    def _plain(self) -> frozenset[str]:
+        """The closed classes whose objects stand for nothing else."""
+        return frozenset(
+            name
+            for name, each in self.closed.items()
+            if not words_in(*each.bases) & {'NamedTuple'}
+            and not {getattr(part, 'name', '') for part in each.body} & _CONVERTING
+        )
+
+    @cached_property
+    def _origins(self) -> Origins:
+        return Origins(self.context.modules, self.functions.values())
+
+    def ask(self, copy: AnnotatedCopy, reports: Sequence[TypeReport]) -> list[ast.expr]:
+        """Return the values whose types tell more of reports."""
+        places = (ReportedPlace(copy, each, self.context.behaviours.places) for each in reports)
+        asked = (
+            value
+            for place in places
+            if place.report.kind in self._readers and not place.is_left_alone
+            for value in place.parts
+        )
+        return [*{id(value): value for value in asked}.values()]
+
+    def learn(
+        self, copy: AnnotatedCopy, asked: Sequence[ast.expr], reports: Sequence[TypeReport]
+    ) -> None:
+        """Read the types of the values that were asked for."""
+        values = {(copy.start(value), copy.end(value)): value for value in asked}
+        for report in reports:
+            start = report.line, copy.original_column(report.line, report.column)
+            end_column = copy.original_column(report.end_line, report.end_column - 1)
+            value = values.get((start, (report.end_line, end_column)))
+            if report.kind == 'reveal-type' and value is not None:
+                # What is known of its attributes comes last.
+                shown = report.message.removeprefix('revealed type: ').partition(' (_.')[0]
+                self.types[id(value)] = shown
 
     def explain_all(
         self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
@@ -277,7 +247,7 @@ class TypeFindings:
 
     # Attributes
 
-    def _attribute(self, place: ReportedPlace) -> _Problem | None:  # noqa: C901
+    def _attribute(self, place: ReportedPlace) -> _Problem | None:
         match = _ATTRIBUTE.search(place.report.message)
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
@@ -290,23 +260,8 @@ class TypeFindings:
         of_node = owner.removesuffix('Parameters').removesuffix('State')
         is_part = owner in ('Coroutine', *_PARTS)
         if owner in self.own or not (is_part or owner in self.messages or of_node in self.nodes):
-            # A class of the project, or of Python: only what is misspelt is certain.
-            is_typo_of = meant and name not in self.defined and _is_misspelt(name, meant[1])
-            # What a name of the state stands for may change.
-            is_value = owner in _SCALARS and '.state.' not in ast.unparse(node)
-            if is_value and isinstance(node.value, ast.Attribute):
-                is_typo_of = is_typo_of or self._is_of_one_type(place, node.value)
-                advice = 'this is the value itself' if name == 'value' else advice
-            if owner in _PLAIN_OWNERS:
-                is_typo_of = is_typo_of or self._is_declared(place, node.value)
-            if owner == 'Mapping' and is_typo_of:
-                owner = ast.unparse(node.value)
-                advice = f"write {owner}['{name}']"
-            elif not (is_typo_of or self._is_set_by_nobody(place, owner, node)):
-                return None
-            advice = self._place_of_constant(owner, name) or OF_RCLPY.get(name, advice)
-            return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
-        if not self._is_of_one_type(place, node.value):
+            return self._attribute_elsewhere(place, owner, node, meant[1] if meant else '')
+        if not self._is_certain(place, node.value, with_state=True):
             return None
         if of_node in self.nodes:
             # The walk of behaviours finds other names that nodes do not have.
@@ -321,6 +276,34 @@ class TypeFindings:
             message = f"'{name}' is read of a coroutine, which has not been awaited"
         return node, rule, message, advice
 
+    def _attribute_elsewhere(
+        self, place: ReportedPlace, owner: str, node: ast.Attribute, meant: str
+    ) -> _Problem | None:
+        """Return an attribute that a class of the project, or of Python, does not have."""
+        name, imports = node.attr, place.copy.module.source.imports
+        advice = did_you_mean(meant or None)
+        of_interface = INTERFACE.search(imports.get(owner, ''))
+        is_certain = bool(meant) and name not in self.defined and _is_misspelt(name, meant)
+        if owner in _PLAIN_OWNERS and not is_certain:
+            is_certain = self._is_certain(place, node.value)
+            advice = 'this is the value itself' if name == 'value' else advice
+        elif owner in self.closed and not is_certain:
+            is_certain = not {name, ''} & self.stored and self._is_certain(place, node.value)
+            # The object may be one of a class that inherits from this one.
+            is_own = place.function is not None and place.function in self.closed[owner].body
+            is_certain &= not (is_own and owner in self.bases)
+        elif of_interface and place.report.message.startswith('Class '):
+            is_certain = True
+            parts = _PARTS_OF_INTERFACES[of_interface[1]]
+            advice = did_you_mean(find_nearest(name, parts), f'it has {", ".join(parts)}')
+        if owner == 'Mapping' and is_certain:
+            owner = ast.unparse(node.value)
+            advice = f"write {owner}['{name}']"
+        elif not (is_certain or self._is_set_by_nobody(place, owner, node)):
+            return None
+        advice = self._place_of_constant(owner, name) or OF_RCLPY.get(name, advice)
+        return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
+
     def _is_set_by_nobody(self, place: ReportedPlace, owner: str, node: ast.Attribute) -> bool:
         """Return whether an attribute of the object itself, or a constant, is set nowhere.
 
@@ -332,8 +315,7 @@ class TypeFindings:
         classes = [each for each in ast.walk(module.tree) if isinstance(each, ast.ClassDef)]
         own = [each for each in classes if each.name == owner]
         if node.attr.isupper() and place.report.message.startswith('Class '):
-            # Of a class that the project writes out, or of the type of a service or an action.
-            return bool(own or _INTERFACE.search(module.source.imports.get(owner, '')))
+            return bool(own)
         names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
         bound = {(each.module, each.class_name) for each in names}
         receiver = function.args.args[0].arg if function and function.args.args else None
@@ -369,29 +351,15 @@ class TypeFindings:
         problem = explain_unknown(self.context.types, description, name)
         return (node, 'unknown-field', *problem) if problem else None
 
-    def _is_of_one_type(self, place: ReportedPlace, value: ast.expr) -> bool:
-        """Return whether a value is no union, of which reports name the part that does not fit."""
-        if self._is_declared(place, value) or _is_annotated(place, value):
-            return True
-        value = owner_of(value)
-        match self._origins.find(place, value):
-            case Chain(path=(_,)):
-                return True
-            case External(name=name) if _INTERFACE.search(name):
-                return True
-        known: ast.AST | None = value
-        if isinstance(value, ast.Name):
-            stored = find_stored(place.function).get(value.id, [])
-            known = stored[0][0] if len(stored) == 1 and not stored[0][1] else None
-        return _is_made(place.copy.module.source.imports, known)
-
-    def _is_declared(self, place: ReportedPlace, value: ast.expr) -> bool:
-        """Return whether a value comes from the node or a message, in one way only.
-
-        The state is left out: what a name of it stands for may change.
-        """
-        origin = self._origins.find(place, value)
-        return isinstance(origin, Chain) and origin.path[1:2] != ('state',)
+    def _is_certain(
+        self, place: ReportedPlace, value: ast.expr, *, with_state: bool = False
+    ) -> bool:
+        """Return whether a value has one type, beside `None`, however the code came there."""
+        # What is calculated with an unset value is unknown.
+        types = {*_alternatives(self.types.get(id(value), ''))} - {'None', 'Unknown'}
+        is_open = len(types) > 1 or 'Any' in types
+        is_known = self._origins.knows(place, value, with_state=with_state)
+        return not is_open and (is_known or _is_annotated(place, value))
 
     # Arguments
 
@@ -402,29 +370,44 @@ class TypeFindings:
         # If the name does not fit, the payload is compared with that of another name.
         wrong_names = [match for match in matches if match[1] == 'name']
         given, parameter, wanted, function = (wrong_names or matches)[-1]
-        given = _TIME.sub(r'\1', given)
         module, _, method = function.rpartition('.')
         owner = module.rpartition('.')[2]
         is_sent = owner in self.nodes and method in SENDING
         if is_sent and parameter in ('', 'name', 'payload'):
             return self._sent(place, owner, method, given)
         if not place.values:
-            return None
-        value, match = place.values[0], _MESSAGE.match(function)
-        for each in place.around:
-            # As in `a.x = b.x = 1`.
-            if isinstance(each, ast.Assign) and value in each.targets:
-                value = each.value
+            return self._overload(place)
+        value, match = _assigned(place) or place.values[0], _MESSAGE.match(function)
         if match is not None:
             field = parameter if match[4] == '__init__' else match[4]
             description = self.context.types.describe(f'{match[1]}/{match[2]}/{match[3]}')
             if description is None:
                 return None
             return self._misfit(description, field, value, given, is_stored=True)
-        if function == 'list.append' and self.messages.get(wanted) and given in _SCALARS:
-            message = f'expected {self._shown(wanted)}, got {given}'
-            return value, 'field-type', message, None
+        if function == 'list.append' and self._is_item(place, value, wanted, given):
+            message = f'expected {self._shown(wanted)}, got {self._shown(given)}'
+            return value, 'field-type', message, _call_of(value, given)
         return self._passed(place, value, given, wanted, parameter, function)
+
+    def _is_item(self, place: ReportedPlace, value: ast.expr, wanted: str, given: str) -> bool:
+        """Return whether a list that something is appended to takes only other types."""
+        func = place.calls[0].func if place.calls else value
+        is_of_message = isinstance(func, ast.Attribute) and self._is_certain(place, func.value)
+        is_wanted = self._is_message(wanted) or (is_of_message and wanted in _SCALARS)
+        return is_wanted and all(map(self._is_known, _alternatives(given)))
+
+    def _overload(self, place: ReportedPlace) -> _Problem | None:
+        """Return a message that a function of Python is given, which takes none."""
+        function = _OVERLOADED.search(place.report.message)
+        if function is None or function[1].partition('.')[0] not in OF_PYTHON:
+            return None
+        for call in place.calls[:1]:
+            for value in call.args:
+                given = self.types.get(id(value), '')
+                if self._is_message(given) and self._is_certain(place, value, with_state=True):
+                    message = f'{function[1]}() does not take {self._shown(given)}'
+                    return value, 'bad-call', message, None
+        return None
 
     def _passed(
         self,
@@ -438,12 +421,12 @@ class TypeFindings:
         """Return that a function of Python or of the node is given what it cannot take."""
         names, method = _certain(given), function.rpartition('.')[2]
         package = function.partition('.')[0]
-        is_certain = self._is_declared(place, value)
+        is_certain = self._is_certain(place, value)
         call = place.calls[0] if place.calls else None
         if call is not None and isinstance(value, ast.Constant):
             # What is called is of a message.
             func = call.func
-            is_certain = isinstance(func, ast.Attribute) and self._is_declared(place, func)
+            is_certain = isinstance(func, ast.Attribute) and self._is_certain(place, func)
         if package in ('composer', 'composer_stubs'):
             message = f"{method}() takes {_TAKEN.get(parameter, wanted)} as '{parameter}', got "
             if parameter == 'behaviour' and isinstance(value, ast.Call) and '|' not in given:
@@ -460,10 +443,10 @@ class TypeFindings:
             return None
         if given in self.nodes or (self.messages.get(given) and given not in self.own):
             what = 'a node' if given in self.nodes else self._shown(given)
-            is_certain = self._is_of_one_type(place, value)
+            is_certain = self._is_certain(place, value, with_state=True)
         else:
             what = self._shown(given)
-            is_certain &= names is not None and package in _OF_PYTHON
+            is_certain &= names is not None and package in OF_PYTHON
         message = f'{function.removeprefix("builtins.")}() does not take {what}'
         return (value, 'bad-call', message, None) if is_certain else None
 
@@ -481,11 +464,13 @@ class TypeFindings:
         noun = SENDING_METHODS[method]
         known = dict(getattr(self.shapes[owner], section))
         if not isinstance(name, ast.Constant):
+            given = self.types.get(id(name), given)
             is_swapped = isinstance(payload, ast.Constant) and payload.value in known
-            if not is_swapped or (given not in self.messages and given not in _SCALARS - {'str'}):
+            if not (self._is_message(given) or (is_swapped and given in _SCALARS - {'str'})):
                 return None
-            message = f'{method}(name, payload) takes the name first, got {given}'
-            return name, 'bad-call', message, 'swap the arguments'
+            message = f'{method}(name, payload) takes the name first, got {self._shown(given)}'
+            advice = 'swap the arguments' if is_swapped else suggest('', known, 'it declares')
+            return name, 'bad-call', message, advice
         if name.value not in known:
             if '' in known or place.depends_on_file:
                 return None
@@ -515,51 +500,45 @@ class TypeFindings:
         if description is None:
             return None
         if isinstance(value, ast.Dict):
-            return self._display(description, value, given)
+            return self._display(description, value)
+        given = self.types.get(id(value), given)
         if len(description.fields) == 1:
             return self._misfit(description, description.fields[0].name, value, given)
-        is_other = self.messages.get(given, '') not in ('', full_name) and given not in _TIMES
-        if not (is_other or _certain(given)):
+        if self._may_fit(FieldType('message', full_name), given, is_stored=False):
             return None
         fields = ', '.join(field.name for field in description.fields)
         advice = f'give its fields by name: {fields}' if fields else 'it has no fields: write {}'
         message = f'expected {in_python(full_name)}, got {self._shown(given)}'
-        return value, 'field-type', message, advice
+        return value, 'field-type', message, _call_of(value, given) or advice
 
-    def _display(
-        self, description: MessageDescription, value: ast.Dict, given: str
-    ) -> _Problem | None:
+    def _display(self, description: MessageDescription, value: ast.Dict) -> _Problem | None:
         """Return what is wrong in a mapping that is written out: a key, or a value."""
         if not all(isinstance(key, ast.Constant) for key in value.keys):
             return None
-        match = _DICT.match(given)
         for key, entry in zip(value.keys, value.values, strict=True):
             name = str(getattr(key, 'value', ''))
-            if description.field(name) is None:
+            field = description.field(name)
+            if field is None:
                 names = [each.name for each in description.fields]
                 error = unknown_field(in_python(description.name), name, names)
                 return (key or entry), 'unknown-field', str(error), error.help
-            problem = self._entry(description, name, entry, match[1] if match else '')
+            problem = self._entry(description, name, field.type, entry)
             if problem:
                 return problem
         return None
 
     def _entry(
-        self, description: MessageDescription, name: str, value: ast.expr, given: str
+        self, description: MessageDescription, name: str, of_type: FieldType, value: ast.expr
     ) -> _Problem | None:
-        field = description.field(name)
-        of_type = field.type if field else None
-        if of_type and isinstance(value, _DISPLAYS) and not of_type.array:
-            nested = of_type.nested and self.context.types.describe(of_type.nested)
-            if nested and isinstance(value, ast.Dict):
-                return self._display(nested, value, given)
-            if of_type.nested and (not nested or len(nested.fields) <= 1):
-                return None
-            kind = 'dict' if isinstance(value, ast.Dict) else 'list'
-            message = f'{in_python(description.name)}: {name}: expected {of_type}, got {kind}'
-            return value, 'field-type', message, None
-        given = type(value.value).__name__ if isinstance(value, ast.Constant) else given
-        return self._misfit(description, name, value, given)
+        nested = of_type.nested and self.context.types.describe(of_type.nested)
+        if isinstance(value, ast.List) and of_type.array:
+            items = (self._entry(description, name, of_type.item, each) for each in value.elts)
+            return next((each for each in items if each), None)
+        if isinstance(value, ast.Dict) and nested and not of_type.array:
+            return self._display(nested, value)
+        given = self.types.get(id(value), '') or _type_of(value)
+        given = given or _TYPES_OF_DISPLAYS.get(type(value), '')
+        return self._misfit(description, name, value, given, of_type)
 
     def _misfit(
         self,
@@ -567,57 +546,68 @@ class TypeFindings:
         name: str,
         value: ast.expr,
         given: str,
+        of_type: FieldType | None = None,
         *,
         is_stored: bool = False,
     ) -> _Problem | None:
-        """Return what is wrong if no value of the type that is given fits a field."""
+        """Return what is wrong if no value of the type that is given fits a field, or its item."""
         field = description.field(name)
         if field is None:
             return None
-        is_wrong = self._is_other_message(field.type, given, is_stored=is_stored)
-        is_single = not field.type.array and (is_stored or not field.type.nested)
-        is_wrong |= is_stored and given == 'None' and isinstance(value, ast.Constant)
-        is_wrong |= is_single and _COLLECTION.fullmatch(given) is not None
-        names = _certain(given)
-        fits = not names or any(self._fits(field.type, each, is_stored) for each in names)
-        items = _ITEMS.fullmatch(given)
-        if items and field.type.array and not field.type.nested:
-            of_item = replace(field.type, array=None)
-            names = _certain(items[1])
-            fits = not names or any(self._fits(of_item, each, is_stored) for each in names)
-        if fits and not is_wrong:
+        of_type, given = of_type or field.type, self.types.get(id(value), given)
+        is_none = given == 'None' and is_stored and isinstance(value, ast.Constant)
+        if not is_none and self._may_fit(of_type, given, is_stored=is_stored):
             return None
-        is_int = is_stored and names == {'int'} and field.type.kind in _FLOATS
-        advice = advise_float(value) if is_int else None
-        if (
-            names
-            and names <= {'bool', 'float', 'int'}
-            and field.type.kind in ('string', 'wstring')
-        ):
+        advice = _call_of(value, given)
+        names = _certain(given) or {''}
+        if names == {'int'} and of_type.kind in _FLOATS:
+            advice = advise_float(value)
+        elif names <= {'bool', 'float', 'int'} and of_type.kind in ('string', 'wstring'):
             advice = advise_text(value)
-        advice = 'write .to_msg()' if given in _TIMES else advice
-        path = f'{in_python(description.name)}: {name}'
-        expected = in_python(field.type.nested) if field.type.nested else str(field.type)
-        expected += '[]' if field.type.nested and field.type.array else ''
-        message = f'{path}: expected {expected}, got {self._shown(given)}'
-        return value, 'field-type', message, advice
+        if given in _TIMES and _TIMES[given] == of_type.nested:
+            text = ast.unparse(value)
+            advice = (
+                f'write ({text}).to_msg()' if isinstance(value, ast.BinOp) else 'write .to_msg()'
+            )
+        expected = in_python(of_type.nested) if of_type.nested else str(of_type)
+        expected += '[]' if of_type.nested and of_type.array else ''
+        message = f'{in_python(description.name)}: {name}: expected {expected}'
+        return value, 'field-type', f'{message}, got {self._shown(given)}', advice
 
-    def _is_other_message(self, field_type: FieldType, given: str, *, is_stored: bool) -> bool:
+    def _may_fit(self, wanted: FieldType, given: str, *, is_stored: bool) -> bool:
+        """Return whether a value of a type, or of one of several, may be a field's value."""
+        return any(self._may_be(wanted, each, is_stored) for each in _without_none(given))
+
+    def _may_be(self, wanted: FieldType, given: str, is_stored: bool) -> bool:  # noqa: FBT001
+        base, _, inner = given.removesuffix(']').partition('[')
+        nested = self.context.types.describe(wanted.nested) if wanted.nested else None
         if given in _TIMES:
-            return is_stored and not field_type.array
-        if not self._is_message(given) or field_type.array:
-            return self._is_message(given)
-        nested = self.context.types.describe(field_type.nested) if field_type.nested else None
-        is_other = nested and len(nested.fields) > 1 and nested.name != self.messages[given]
-        return bool(is_other) or not field_type.nested
+            return not is_stored and not wanted.array and wanted.nested == _TIMES[given]
+        if self._is_message(given) and nested and nested.name == self.messages[given]:
+            return not wanted.array
+        if base == 'dict':
+            return bool(nested) and not (wanted.array or is_stored)
+        if wanted.array and base in _COLLECTIONS:
+            is_plain = base in ('list', 'set') and bool(inner)
+            return not is_plain or self._may_fit(wanted.item, inner, is_stored=is_stored)
+        if wanted.nested and not wanted.array:
+            if nested and len(nested.fields) == 1 and not is_stored:
+                return self._may_be(nested.fields[0].type, given, is_stored)
+            return nested is None or not self._is_known(given)
+        if given in _SCALARS:
+            return self._fits(wanted, given, is_stored)
+        return not self._is_known(given)
+
+    def _is_known(self, given: str) -> bool:
+        """Return whether a type is one that no field takes, if it is not its own."""
+        base = given.partition('[')[0]
+        is_plain = given in self._plain or given in _SCALARS or base in _COLLECTIONS
+        return is_plain or base == 'type' or _is_function(given) or self._is_message(given)
 
     def _fits(self, field_type: FieldType, given: str, is_stored: bool) -> bool:  # noqa: FBT001
         kind = field_type.kind
         if field_type.array:
             return given == 'bytes' and kind in OCTET_KINDS
-        if field_type.nested:
-            nested = self.context.types.describe(field_type.nested)
-            return nested is None or (len(nested.fields) <= 1 and not is_stored)
         if kind in ('string', 'wstring'):
             return given == 'str'
         if kind in _FLOATS:
@@ -628,11 +618,11 @@ class TypeFindings:
         return given in {'bool', 'int'} if is_integer else given not in {'str', 'bytes', 'float'}
 
     def _shown(self, given: str) -> str:
-        if given in _TIMES:
-            return f'{_PARTS[given]} of rclpy'
-        if full_name := self.messages.get(given):
-            return in_python(full_name)
-        return _LITERAL.sub(_type_of_literal, given)
+        names = [
+            in_python(self.messages.get(each, '')) or _PARTS.get(each, each)
+            for each in _without_none(given)
+        ]
+        return 'a function' if _is_function(given) else ' | '.join(dict.fromkeys(names))
 
     # Calls, operators and comparisons
 
@@ -647,13 +637,13 @@ class TypeFindings:
             return self._unknown_field(f'{match[1]}/{match[2]}/{match[3]}', keyword[1], value)
         if not function[1].startswith(('composer_stubs.', 'composer.', 'rclpy.')):
             return None
-        method = function[1].removesuffix('.__init__').rpartition('.')[2]
+        method = function[1].removesuffix('.__init__').rpartition('.')[2].removeprefix('Rclpy')
         return place.calls[0], 'bad-call', f"{method}() takes no argument '{keyword[1]}'", None
 
     def _count(self, place: ReportedPlace) -> _Problem | None:
         function = _FUNCTION.search(place.report.message)
         match = _MESSAGE.match(function[1]) if function else None
-        time = _TIME.match(function[1].removesuffix('.__init__')) if function else None
+        time = _TIME.match(function[1]) if function else None
         if time and place.calls:
             advice = f'write {time[1]}(seconds=…)'
             return place.calls[0], 'bad-call', f'{time[1]} takes its values by name only', advice
@@ -672,22 +662,24 @@ class TypeFindings:
         values = [node for node in place.values if isinstance(node, ast.BinOp | ast.Compare)]
         if match is None or not values:
             return None
-        given = [match[2], match[3]]
-        given = [_LITERAL.sub(_type_of_literal, each).partition('[')[0] for each in given]
-        given = [_TIME.sub(r'\1', _TIME_MESSAGE.sub(r'msg.\1', each)) for each in given]
-        known = {*_TIMES, *_TIME_MESSAGES, *self.messages} - self.own
+        several = [_alternatives(each) for each in (match[2], match[3])]
+        given = [each[0].partition('[')[0] if len(each) == 1 else '' for each in several]
+        known = {*_TIMES, *filter(self._is_message, self.messages)}
         if not {*given} <= _PLAIN_OWNERS | known:
             return None
         parts = [node for node in ast.iter_child_nodes(values[0]) if isinstance(node, ast.expr)]
         parts = [part for part in parts if not isinstance(part, ast.Constant | ast.List)]
-        is_certain = self._is_of_one_type if {*given} & known else self._is_declared
-        if not all(is_certain(place, part) for part in parts):
+        with_state = bool({*given} & known)
+        if len(parts) == len(given):
+            # No message goes with anything else.
+            both = zip(parts, given, strict=True)
+            parts = [part for part, each in both if self._is_message(each)] or parts
+        if not all(self._is_certain(place, part, with_state=with_state) for part in parts):
             return None
-        shown = _PARTS | _TIME_MESSAGES
-        left, right = (shown.get(each) or self._shown(each) for each in given)
+        left, right = map(self._shown, given)
         message = f"'{match[1]}' is not possible between {left} and {right}"
-        stamps = [each for each in given if each in _TIME_MESSAGES]
-        advice = f'write {stamps[0][4:]}.from_msg(…)' if stamps else None
+        stamps = [each for each in given if self.messages.get(each) in _TIMES.values()]
+        advice = f'write {stamps[0]}.from_msg(…)' if stamps else None
         return values[0], 'bad-call', message, advice
 
     def _bound(self, place: ReportedPlace) -> _Problem | None:
@@ -701,7 +693,7 @@ class TypeFindings:
         """Return an item that a message, a number or an array does not have."""
         given = _INDEXED.search(place.report.message)
         values = [node for node in place.values if isinstance(node, ast.Subscript)]
-        if given is None or not values or not self._is_declared(place, values[0].value):
+        if given is None or not values or not self._is_certain(place, values[0].value):
             return None
         owner, key = given[1], values[0].slice
         if self._is_message(owner):
@@ -723,7 +715,7 @@ class TypeFindings:
         for node in place.around:
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
                 values = [node.value]
-        if given is None or not values or not self._is_of_one_type(place, values[0]):
+        if given is None or not values or not self._is_certain(place, values[0], with_state=True):
             return None
         if given[1] not in {'bool', 'float', 'int'} and not self._is_message(given[1]):
             return None
@@ -735,9 +727,10 @@ class TypeFindings:
         what = owner[1] if owner and owner[1] not in self.own else ''
         for node in place.values:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                is_certain = what in _SCALARS and self._is_declared(place, node.func)
+                is_certain = what in _SCALARS and self._is_certain(place, node.func)
+                is_certain |= self._is_message(what)
                 if is_certain or (what in _PARTS and isinstance(node.func.value, ast.Name)):
-                    message = f"'{node.func.attr}' is {_PARTS.get(what, what)}: no method"
+                    message = f"'{node.func.attr}' is {self._shown(what)}: no method"
                     return node.func, 'bad-call', message, None
         return None
 
@@ -751,8 +744,11 @@ class TypeFindings:
             return None
         left, right = found[0].left, found[0].comparators[0]
         names = [_certain(types[1]), _certain(types[2])]
-        is_plain = isinstance(left, ast.Attribute) and isinstance(right, ast.Constant)
-        if not all(names) or not is_plain or not self._is_of_one_type(place, left):
+        is_plain = isinstance(left, ast.Attribute | ast.Name) and isinstance(right, ast.Constant)
+        with_state = isinstance(left, ast.Attribute)
+        if not all(names) or not is_plain:
+            return None
+        if not self._is_certain(place, left, with_state=with_state):
             return None
         shown = ' and '.join(' | '.join(sorted(each or ())) for each in names)
         message = f'values of these types are never equal: {shown}'
@@ -764,18 +760,11 @@ def _is_misspelt(name: str, meant: str) -> bool:
     return is_typo(name, meant) and name.startswith('_') == meant.startswith('_')
 
 
-def _is_made(imports: Mapping[str, str], value: ast.AST | None) -> bool:
-    """Return whether an expression has the one type that the stubs give it."""
-    match value:
-        case ast.Await(value=inner):
-            return _is_made(imports, inner)
-        case ast.Call(func=ast.Name(id=name)):
-            return bool(_INTERFACE.search(imports.get(name, '')))
-        case ast.Call(func=ast.Attribute(value=ast.Attribute(attr='node' | '_node'))):
-            return True
-        case ast.Call(func=ast.Attribute()) | ast.Attribute() | ast.BinOp():
-            return not words_in(value) & {'self', 'cls'}
-    return False
+def _assigned(place: ReportedPlace) -> ast.expr | None:
+    """Return what is assigned, where a report is at its target."""
+    is_target = isinstance(getattr(place.values[0], 'ctx', None), ast.Store)
+    assigned = (each.value for each in place.around if isinstance(each, ast.Assign))
+    return next(assigned, None) if is_target else None
 
 
 def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
@@ -802,14 +791,57 @@ def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
     return bool(names) and all(len(each) == 1 for each in names)
 
 
-def _type_of_literal(literal: re.Match[str]) -> str:
-    return type(ast.literal_eval(literal[1])).__name__
+def _alternatives(given: str) -> list[str]:
+    """Return the types of a union, with that of a literal in its place."""
+    try:
+        pending: list[ast.expr] = [ast.parse(given, mode='eval').body]
+    except SyntaxError:
+        return [given]
+    found: dict[str, None] = {}
+    while pending:
+        match pending.pop():
+            case ast.BinOp(op=ast.BitOr(), left=left, right=right):
+                pending += [right, left]
+            case ast.Subscript(value=ast.Name(id='Literal'), slice=inner):
+                for each in inner.elts if isinstance(inner, ast.Tuple) else [inner]:
+                    # Of an enumeration, its class.
+                    found[_type_of(each) or ast.unparse(getattr(each, 'value', each))] = None
+            case ast.Name(id='LiteralString'):
+                found['str'] = None
+            case each:
+                found[_type_of(each) or ast.unparse(each)] = None
+    return [*found]
+
+
+def _without_none(given: str) -> list[str]:
+    """Return the types of a union beside `None`, unless that is all."""
+    several = _alternatives(given)
+    return [each for each in several if each != 'None'] or several
 
 
 def _certain(given: str) -> set[str] | None:
     """Return the plain types that a value has; `None` if it may have others."""
-    names = {_LITERAL.sub(_type_of_literal, each) for each in given.split(' | ')}
+    names = {*_alternatives(given)}
     return names if names <= _SCALARS else None
+
+
+def _type_of(value: ast.expr) -> str:
+    """Return the type of a constant, empty for anything else."""
+    while isinstance(value, ast.UnaryOp):
+        value = value.operand
+    if not isinstance(value, ast.Constant):
+        return ''
+    return 'None' if value.value is None else type(value.value).__name__
+
+
+def _is_function(given: str) -> bool:
+    return '->' in given
+
+
+def _call_of(value: ast.expr, given: str) -> str | None:
+    """Return the help for a function or class that stands where its result is meant."""
+    is_meant = _is_function(given) or given.startswith('type[')
+    return f'call it: {ast.unparse(value)}()' if is_meant else None
 
 
 def _span(copy: AnnotatedCopy, node: ast.expr, rule: str, message: str) -> Span:

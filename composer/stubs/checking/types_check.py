@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from composer.python_source.syntax import words_in
 from composer.stubs.checking.annotated_copies import (
     Annotator,
     find_certain_values,
     find_received_values,
 )
-from composer.stubs.checking.type_checker import run_type_checker
+from composer.stubs.checking.type_checker import run_type_checker, version_of
 from composer.stubs.checking.type_findings import TypeFindings
 from composer.stubs.message_stubs import SUPPORT
 from composer.stubs.node_stubs import NodeShape, merge_shapes, write_nodes
@@ -28,12 +31,14 @@ from composer.stubs.system_stubs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic
     from composer.language.specs import NodeSpec
+    from composer.stubs.checking.annotated_copies import AnnotatedCopy
+    from composer.stubs.checking.type_checker import TypeReport
     from composer.stubs.project_modules import ProjectModule
 
 _CLASS = re.compile(r'^class (\w+)', re.MULTILINE)
@@ -59,9 +64,10 @@ def find_type_errors(
     shapes = classes.shapes_by_name()
     files[f'{module.replace(".", "/")}.pyi'] = text_of(write_nodes(module, shapes))
     files |= stand_ins(context.spec.qos)
-    texts = {path: copy.text for path, copy in copies.items()}
-    version, reports = run_type_checker(program, texts, files)
-    own, defined = _own_names(modules)
+    version, reports = version_of(program), _run(program, copies, files)
+    own, defined, attributes = _own_names(modules)
+    syntax = (node for module in modules.values() for node in ast.walk(module.tree))
+    written = [node for node in syntax if isinstance(node, ast.ClassDef)]
     findings = TypeFindings(
         context,
         classes.nodes_by_name,
@@ -71,12 +77,29 @@ def find_type_errors(
         own,
         frozenset(modules),
         defined,
+        attributes,
+        _closed_classes(written),
+        frozenset(base for each in written for base in words_in(*each.bases)),
+        {},
     )
-    return version, [
-        finding
-        for path, copy in copies.items()
-        for finding in findings.explain_all(copy, [each for each in reports if each.path == path])
-    ]
+    asked = {path: findings.ask(copy, reports[path]) for path, copy in copies.items()}
+    if any(asked.values()):
+        revealing = {path: copy.revealing(asked[path]) for path, copy in copies.items()}
+        for path, several in _run(program, revealing, files).items():
+            findings.learn(revealing[path], asked[path], several)
+    found = (findings.explain_all(copy, reports[path]) for path, copy in copies.items())
+    return version, [*itertools.chain.from_iterable(found)]
+
+
+def _run(
+    program: Path, copies: Mapping[str, AnnotatedCopy], stubs: Mapping[str, str]
+) -> dict[str, list[TypeReport]]:
+    """Return what the type checker reports of each copy."""
+    texts = {path: copy.text for path, copy in copies.items()}
+    reports: dict[str, list[TypeReport]] = {path: [] for path in copies}
+    for report in run_type_checker(program, texts, stubs):
+        reports[report.path].append(report)
+    return reports
 
 
 @dataclass(slots=True)
@@ -120,14 +143,44 @@ def _message_classes(files: dict[str, str]) -> dict[str, str]:
     return names
 
 
-def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], frozenset[str]]:
+# Classes and decorators that add no attributes but those of Python.
+_PLAIN_BASES = frozenset({'ABC', 'Enum', 'Flag', 'NamedTuple', 'object'})
+_PLAIN_DECORATORS = frozenset({'dataclass', 'dataclasses', 'final', 'total_ordering', 'unique'})
+
+
+def _closed_classes(classes: Sequence[ast.ClassDef]) -> dict[str, ast.ClassDef]:
+    """Return the classes whose attributes are all written out, by their names."""
+    names = Counter(each.name for each in classes)
+    closed: dict[str, ast.ClassDef] = {}
+    # One may come before its base.
+    for each in [*classes, *classes]:
+        marks = {
+            word for mark in each.decorator_list for word in words_in(getattr(mark, 'func', mark))
+        }
+        methods = {getattr(part, 'name', '') for part in each.body}
+        if (
+            names[each.name] == 1
+            and words_in(*each.bases) <= _PLAIN_BASES | closed.keys()
+            and marks <= _PLAIN_DECORATORS
+            and not each.keywords
+            and not methods & {'__getattr__', '__getattribute__'}
+        ):
+            closed[each.name] = each
+    return closed
+
+
+def _own_names(
+    modules: Mapping[str, ProjectModule],
+) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
     """Return the names of classes of which the stubs do not tell all, and all that are defined.
 
     The first are classes that the modules define, import from anywhere but ROS, or add attributes
-    to; the second all names that their code may give to something, with an empty one for any.
+    to; the second all names that their code may give to something, with an empty one for any; the
+    last those of them that are attributes.
     """
     own: set[str] = set()
     defined: set[str] = set()
+    attributes: set[str] = set()
     for module in modules.values():
         imports, top = module.source.imports.items(), module.source.top
         own |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
@@ -143,5 +196,6 @@ def _own_names(modules: dict[str, ProjectModule]) -> tuple[frozenset[str], froze
                     own.add(owner)
                 case ast.Constant(value=str(name)) if name:
                     defined.add(name)
-        defined |= {*+stored} | top.all_stored - {name for name, _ in imports}
-    return frozenset(own), frozenset(defined)
+        attributes |= {*+stored}
+        defined |= top.all_stored - {name for name, _ in imports}
+    return frozenset(own), frozenset(defined | attributes), frozenset(attributes)
