@@ -65,7 +65,7 @@ def shape_of(
         created: What its behaviours create.
     """
     known = [names for names in stored if names is not None]
-    parameters = {name: _type_of(each) for name, each in node.parameters.items()}
+    parameters = {name: type_of_parameter(each) for name, each in node.parameters.items()}
     names = sorted({*node.state}.union(*known))
     values = {name: [node.state[name]] if name in node.state else [] for name in names}
     state = ((name, types_of_state(values[name], known, name)) for name in names)
@@ -119,7 +119,7 @@ def _full_name(created: CreatedEntity) -> str:
     return created.type if created.type and created.type.count('/') == _SLASHES else ''
 
 
-def _type_of(parameter: ParameterSpec) -> str:
+def type_of_parameter(parameter: ParameterSpec) -> str:
     """Return the Python type of a parameter's value.
 
     One that is not set has the value `None`, until somebody sets it.

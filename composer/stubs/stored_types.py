@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
+    from composer.interfaces.message_types import MessageTypes
     from composer.node_uses.names import Value
     from composer.python_source.syntax import FunctionNode
     from composer.stubs.project_modules import ProjectModule
@@ -169,8 +170,10 @@ class _Values(Names):
             case ast.Compare(ops=[ast.Is() | ast.IsNot() | ast.In() | ast.NotIn(), *_]):
                 return 'bool'
         match self.value_of(value, scope):
+            case Chain(path=('made', name)) if ':' in name:
+                return name
             case Chain(path=('made', name, *path)):
-                return self._type_in(name, path)
+                return type_in(self._types, name, path)
             case Instance(of=of) if of.definition in of.module.body:
                 return f'{self.name_of(of.module)}:{of.definition.name}'
         return ANYTHING
@@ -193,20 +196,19 @@ class _Values(Names):
                 return Chain(('made', _TIMES[name]))
         return super()._result_of(call, scope)
 
-    def _type_in(self, name: str, path: Iterable[str]) -> str:
-        """Return the type of a message, or of a field in it."""
-        if ':' in name:
-            return ANYTHING if [*path] else name
-        found = FieldType('message', name)
-        for each in path:
-            nested = self._types.describe(found.nested) if found.nested else None
-            field = nested.field(each) if nested and not found.array else None
-            if field is not None:
-                found = field.type
-            elif found.array and found.nested and each.startswith('['):
-                found = found.item
-            else:
-                return ANYTHING
-        if found.array or (found.nested and self._types.describe(found.nested) is None):
+
+def type_in(types: MessageTypes, name: str, path: Iterable[str]) -> str:
+    """Return the type of a message, or of a field in it."""
+    found = FieldType('message', name)
+    for each in path:
+        nested = types.describe(found.nested) if found.nested else None
+        field = nested.field(each) if nested and not found.array else None
+        if field is not None:
+            found = field.type
+        elif found.array and found.nested and each.startswith('['):
+            found = found.item
+        else:
             return ANYTHING
-        return found.nested or FieldTypes(StubImports('')).read(found)
+    if found.array or (found.nested and types.describe(found.nested) is None):
+        return ANYTHING
+    return found.nested or FieldTypes(StubImports('')).read(found)

@@ -18,16 +18,24 @@ from composer.language.bindings import node_bindings
 from composer.node_uses.names import Chain
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.modules import FunctionSource
-from composer.python_source.syntax import FUNCTIONS, count_characters, stored_names
+from composer.python_source.syntax import (
+    FUNCTIONS,
+    count_characters,
+    list_arguments,
+    stored_names,
+    words_in,
+)
 from composer.records import record
 from composer.stubs.message_stubs import StubImports
-from composer.stubs.node_stubs import named
+from composer.stubs.node_stubs import named, type_of_parameter
 from composer.stubs.project_modules import all_nodes
+from composer.stubs.stored_types import ANYTHING, type_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from composer.checks.context import CheckContext
+    from composer.interfaces.message_types import MessageTypes
     from composer.language.bindings import Binding
     from composer.language.specs import NodeSpec
     from composer.node_uses.names import Value
@@ -42,13 +50,13 @@ _ASKING = frozenset({'hasattr', 'getattr', 'setattr', 'delattr'})
 
 @dataclass(slots=True)
 class Received:
-    """The keys of nodes and full names of messages that a parameter is given.
+    """The keys of nodes, and the types, that a parameter is given.
 
     It is open if it may be given something else.
     """
 
     nodes: dict[str, None] = field(default_factory=dict)
-    messages: dict[str, None] = field(default_factory=dict)
+    types: dict[str, None] = field(default_factory=dict)
     is_open: bool = False
 
 
@@ -72,18 +80,25 @@ class FunctionUse:
             for name, each in self.received.items()
         }
 
-    def give(self, name: str, value: Value | None, node: NodeSpec, wire: Wire) -> None:
+    @property
+    def is_chosen(self) -> bool:
+        """Whether an argument of another kind decides what is done: whoever calls it knows."""
+        names = {each.arg for each in list_arguments(self.definition.args)} - {'self', 'cls'}
+        names -= {name for name, each in self.received.items() if not each.is_open}
+        return self.is_called and any(
+            words_in(node.test) & names and any(isinstance(each, ast.Return) for each in node.body)
+            for node in ast.walk(self.definition)
+            if isinstance(node, ast.If)
+        )
+
+    def give(self, name: str, value: Value | None, node: NodeSpec, of_type: str) -> None:
         """Note what a parameter is given by a behaviour of a node."""
         received = self.received.setdefault(name, Received())
-        match value:
-            case Chain(path=('node',)):
-                received.nodes[node.key] = None
-            case Chain(path=('message',)) if wire.given:
-                received.messages[wire.given] = None
-            case Chain(path=('made', str(made))):
-                received.messages[made] = None
-            case _:
-                received.is_open = True
+        if value == Chain(('node',)):
+            received.nodes[node.key] = None
+        else:
+            received.types[of_type] = None
+            received.is_open |= of_type == ANYTHING
 
 
 def find_received_values(
@@ -111,8 +126,20 @@ def find_received_values(
                 if use is not None:
                     use.is_called |= passed.is_call
                     for name, value in passed.given.items():
-                        use.give(name, value, node, wire)
+                        of_type = _type_of(context.types, value, node, wire)
+                        use.give(name, value, node, of_type)
     return functions
+
+
+def _type_of(types: MessageTypes, value: Value | None, node: NodeSpec, wire: Wire) -> str:
+    match value:
+        case Chain(path=('node', 'parameters', name)) if name in node.parameters:
+            return type_of_parameter(node.parameters[name])
+        case Chain(path=('message', *path)) if wire.given:
+            return type_in(types, wire.given, path)
+        case Chain(path=('made', name, *path)):
+            return type_in(types, name, path)
+    return ANYTHING
 
 
 def find_certain_values(
@@ -121,9 +148,10 @@ def find_certain_values(
     """Return what parameters stand for that are given one type alone, by their functions."""
     return {
         id(use.definition): {
-            name: Chain(('node',) if each.nodes else ('made', *each.messages))
+            name: Chain(('node',) if each.nodes else ('made', *each.types))
             for name, each in use.received.items()
-            if not each.is_open and bool(each.nodes) + len(each.messages) == 1
+            if not each.is_open and bool(each.nodes) + len(each.types) == 1
+            if each.nodes or '/' in ''.join(each.types)
         }
         for use in functions.values()
     }
@@ -264,7 +292,8 @@ class Annotator:
     def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
         arguments = use.definition.args
         changed = stored_names(use.definition)
-        for each in (*arguments.posonlyargs, *arguments.args):
+        pending = [] if use.is_chosen else [*arguments.posonlyargs, *arguments.args]
+        for each in pending:
             received = use.received.get(each.arg)
             wanted = self._annotation(received) if received else None
             if wanted and each.arg not in changed:
@@ -290,12 +319,12 @@ class Annotator:
                         yield _after(target, wanted, lines)
 
     def _annotation(self, received: Received) -> str | None:
-        if received.is_open or bool(received.nodes) == bool(received.messages):
+        if received.is_open or bool(received.nodes) == bool(received.types):
             return None
         if received.nodes:
             return self._imports.take(*self.name_nodes(received.nodes))
         # A function that is given messages of several types tells them apart in its own ways.
-        return self._imports.message(*received.messages) if len(received.messages) == 1 else None
+        return named(self._imports, *received.types) if len(received.types) == 1 else None
 
     def _returned(self, use: FunctionUse) -> str | None:
         kind = FunctionSource(use.definition).kind
@@ -330,7 +359,7 @@ class Annotator:
 def _after(node: ast.arg | ast.expr, wanted: str, lines: list[str]) -> _Edit:
     line = node.end_lineno or node.lineno
     end = count_characters(lines[line - 1], node.end_col_offset or 0)
-    return _Edit(line, end, end, f": '{wanted}'")
+    return _Edit(line, end, end, f': {wanted!r}')
 
 
 def _annotate(

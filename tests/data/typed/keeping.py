@@ -49,3 +49,26 @@ class Follower:
         node.logger.info(f'{(node.now() - self.started).nanosecond}')  # error
         node.logger.info(f'{node.now() - node.state.stamp}')  # error
         node.logger.info(f'{node.state.place.pose.position}')
+
+    def turn(self, node, path):
+        for pose in path.poses:
+            _ahead(pose.pose, node.parameters.speed)
+            node.logger.info(f'{_x_of(pose, is_stamped=True)}')
+        _wait(node, node.parameters.mode, node.parameters.frame)
+
+
+def _ahead(pose, speed):
+    pose.orientation.w = 1  # error
+    pose.position.x = speed
+    return speed.x  # error
+
+
+def _x_of(pose, is_stamped):
+    if is_stamped:
+        return pose.pose.position.x
+    return pose.position.x
+
+
+def _wait(node, mode, frame):
+    node.logger.info(mode.upper())
+    node.sleep(frame)  # error
