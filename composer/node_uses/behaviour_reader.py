@@ -57,8 +57,14 @@ _ANSWERS: dict[str, tuple[set[type], str]] = {
 
 _TYPES = {ast.Compare: bool, ast.Dict: dict, ast.List: list, ast.JoinedStr: str}
 _FUNCTIONS = (*FUNCTIONS, ast.Lambda)
-# What code may hand on to use any of it.
-_PARTS = {'own_state': 'own_state', 'parameters': 'parameter'}
+# What code may hand on to use or create any of a kind.
+_OPENING = {
+    'own_state': 'own_state',
+    'parameters': 'parameter',
+    'publishers': 'publisher',
+    **{method: f'new {noun}' for method, noun in CREATING_METHODS.items()},
+    **SENDING_METHODS,
+}
 
 
 @dataclass(slots=True)
@@ -67,14 +73,12 @@ class Mentions:
 
     Attributes:
         names: Its texts, the attributes that it names, and the globals that it stores.
-        stored: Those of the names that it may set in the state.
-        created: The kinds and names of what it may create; `None` for any name.
-        open_kinds: The kinds of which it may use any.
+        stored: Those of the names that it may set in the state, or create.
+        open_kinds: The kinds of which it may use any, and as in `new publisher` create any.
     """
 
     names: set[str] = field(default_factory=set)
     stored: set[str] = field(default_factory=set)
-    created: set[tuple[str, Any]] = field(default_factory=set)
     open_kinds: set[str] = field(default_factory=set)
 
 
@@ -113,17 +117,19 @@ class BehaviourReader:
             self._wires[place] = wire_of(node, binding, self._has_real_type)
         return self._wires[place]
 
-    def mentions(self, reading: Reading) -> Mentions:
-        """Return what the modules of a behaviour may use beside what was read of it."""
+    def mentions(self, *readings: Reading) -> Mentions:
+        """Return what the modules of behaviours may use beside what was read of them."""
         found = Mentions()
-        parts: list[Any] = [reading, *reading.modules.values()]
-        for part in parts:
-            if id(part) not in self._mentions:
+        parts: dict[int, Any] = {id(each): each for each in readings}
+        for each in readings:
+            parts |= each.modules
+        for key, part in parts.items():
+            if key not in self._mentions:
                 is_module = isinstance(part, ModuleSource)
                 unread = _unread(part, self.places) if is_module else part.unresolved
-                self._mentions[id(part)] = _find_mentions(unread)
-            for each in fields(found):
-                getattr(found, each.name).update(getattr(self._mentions[id(part)], each.name))
+                self._mentions[key] = _find_mentions(unread)
+            for kept in fields(found):
+                getattr(found, kept.name).update(getattr(self._mentions[key], kept.name))
         return found
 
     def _read_anew(self, binding: Binding, wire: Wire) -> Reading:
@@ -293,6 +299,7 @@ def _type_of(value: ast.expr) -> type | None:
 def _find_mentions(nodes: Iterable[ast.AST]) -> Mentions:
     """Return what code may use of which nobody knows whether it is of the node."""
     found = Mentions()
+    # What names all that it is used for.
     plain: set[int] = set()
     for node in nodes:
         match node:
@@ -300,40 +307,31 @@ def _find_mentions(nodes: Iterable[ast.AST]) -> Mentions:
                 found.names.add(text)
             case ast.Global(names=names):
                 found.names.update(names)
-            case ast.Attribute(attr=attribute):
-                found.names.add(attribute)
-                if attribute in _PARTS and id(node) not in plain:
-                    found.open_kinds.add(_PARTS[attribute])
-        match node:
-            case ast.Attribute(value=ast.Name(id='self')):
-                pass
-            case ast.Attribute(attr=name, ctx=ast.Store()):
-                found.stored.add(name)
-            case ast.Call(func=ast.Name(id='setattr'), args=[_, ast.Constant(str(name)), _]):
-                found.stored.add(name)
-            case ast.Subscript(slice=ast.Constant(value=str(name))):
+            case ast.Attribute(value=inner, attr=name):
                 found.names.add(name)
-                if isinstance(node.ctx, ast.Store):
+                if isinstance(node.ctx, ast.Store) and getattr(inner, 'id', '') != 'self':
                     found.stored.add(name)
-            case ast.Call(func=ast.Attribute(attr=method), args=[_, channel, *_]) if (
-                method in CREATING_METHODS
-            ):
-                named = [each.value for each in node.keywords if each.arg == 'name'] or [channel]
-                made = named[0].value if isinstance(named[0], ast.Constant) else None
-                found.created.add((CREATING_METHODS[method], made))
-        match node:
-            case (
-                ast.Attribute(value=ast.Attribute(attr='parameters') as part)
-                | ast.Subscript(value=ast.Attribute() as part, slice=ast.Constant())
-            ):
-                plain.add(id(part))
-            case ast.Call(func=ast.Attribute(attr=method), args=[sent, *_]) if (
-                method in SENDING_METHODS
-            ):
-                if not isinstance(sent, ast.Constant):
-                    found.open_kinds.add(SENDING_METHODS[method])
+                if name in _OPENING and id(node) not in plain:
+                    found.open_kinds.add(_OPENING[name])
+                if name == 'get' or not hasattr(dict, name):
+                    plain.add(id(inner))
+            case ast.Subscript(value=inner, slice=ast.Constant(value=str(text))):
+                plain.add(id(inner))
+                found.names.add(text)
+                found.stored |= {text} if isinstance(node.ctx, ast.Store) else set()
+            case ast.Call(func=ast.Name(id='setattr'), args=[_, ast.Constant(value=str(text)), _]):
+                found.stored.add(text)
+            case ast.Call(func=ast.Name(id='setattr'), args=[ast.Attribute(attr='state'), *_]):
+                found.open_kinds.add('state')
             case ast.Call(func=ast.Name('exec' | 'eval')):
                 found.open_kinds |= USED_NOUNS
+            case ast.Call(func=ast.Attribute(attr=method) as func) if method in _OPENING:
+                keys = ('name', 'topic', 'srv_name')
+                named = [each.value for key in keys for each in node.keywords if each.arg == key]
+                match [*named, *node.args[method in CREATING_METHODS :]]:
+                    case [ast.Constant(value=str(text)), *_]:
+                        plain.add(id(func))
+                        found.stored |= {text} if method in CREATING_METHODS else set()
     return found
 
 

@@ -203,19 +203,17 @@ class _Body:
             return
         if self.context.was_dropped((*node.path, 'state')):
             return
-        mentions = [self.context.behaviours.mentions(reading) for reading in readings]
+        mentions = self.context.behaviours.mentions(*readings)
         known = set(node.state).union(*(reading.state_set for reading in readings))
-        tested = set().union(*(reading.state_tested for reading in readings))
-        tested |= set().union(*(each.stored for each in mentions))
+        tested = mentions.stored.union(*(reading.state_tested for reading in readings))
         used = tested.union(*({use.name for use in each.state_read} for each in readings))
-        mentioned = set().union(*(each.names for each in mentions))
         for name, place in self.reading.state_set.items():
             near = find_nearest(name, node.state)
             # One that is set for nobody may be meant to be a declared one.
-            if near and is_typo(name, near) and name not in {*node.state, *used, *mentioned}:
+            if near and is_typo(name, near) and name not in {*node.state, *used, *mentions.names}:
                 text = f"'{name}' is set in the state, and nothing reads it"
                 yield Problem('unknown-state', text, place, f"did you mean '{near}'?")
-        for use in self.reading.state_read:
+        for use in () if 'state' in mentions.open_kinds else self.reading.state_read:
             is_guarded = use.is_guarded and find_nearest(use.name, known) is None
             if use.name not in known and use.name not in tested and not is_guarded:
                 text = f"neither 'state:' of node '{node.name}' nor a behaviour sets '{use.name}'"
@@ -226,11 +224,10 @@ class _Body:
         """Check the keys of `node.own_state` that are read: the behaviour has to set them."""
         owner = self.binding.own_state_of
         own = [reading for binding, reading in self.readings if binding.own_state_of == owner]
-        mentions = [self.context.behaviours.mentions(reading) for reading in own]
-        known = set().union(*(reading.own_state_set for reading in own))
-        known |= set().union(*(each.stored for each in mentions))
+        mentions = self.context.behaviours.mentions(*own)
+        known = mentions.stored.union(*(reading.own_state_set for reading in own))
         is_open = any(reading.is_own_state_open for reading in own)
-        is_open |= any('own_state' in each.open_kinds for each in mentions)
+        is_open |= 'own_state' in mentions.open_kinds
         for use in () if is_open else self.reading.own_state_read:
             if use.name not in known and not use.is_guarded:
                 text = f"nothing sets '{use.name}' in the own_state of {self.binding.owner}"

@@ -77,8 +77,7 @@ def _check_names(
         is_open = any(reading.reaches_ros for _, reading in uses[name])
         is_open |= node.has_other_parameters
         created = {(each.kind, each.name) for _, read in uses[name] for each in read.created}
-        mentions = [context.behaviours.mentions(reading) for _, reading in uses[name]]
-        created |= {pair for each in mentions for pair in each.created}
+        mentions = context.behaviours.mentions(*(reading for _, reading in uses[name]))
         used = {(use.kind, use.name) for _, reading in uses[name] for use in reading.uses}
         for binding, reading in uses[name]:
             known = declared[binding.behaviour.name]
@@ -87,7 +86,8 @@ def _check_names(
                 if use.is_guarded or (is_open and use.kind == 'parameter'):
                     continue
                 made = [each for kind, each in created if kind == use.kind]
-                if None in made or use.name in made:
+                made += () if use.kind == 'parameter' else mentions.stored
+                if None in made or use.name in made or f'new {use.kind}' in mentions.open_kinds:
                     continue
                 if _is_declared(node, use.kind, use.name, lost.get(name, [])):
                     continue
@@ -226,17 +226,16 @@ def _check_unused(
         names |= {('parameter', name) for name in node.followed}
         names |= {('publisher', each.name) for each in node.publishers.values() if each.made_by}
         names |= set(_meant(node, names))
-        mentions = [context.behaviours.mentions(each) for each in uses]
-        mentioned = set().union(*(each.names for each in mentions))
-        open_kinds |= set().union(*(each.open_kinds for each in mentions))
+        mentions = context.behaviours.mentions(*uses)
+        open_kinds |= mentions.open_kinds
         for kind in USED_KINDS:
             for name, entity in getattr(node, kind.section).items():
                 is_used = kind.noun in open_kinds or (kind.noun, name) in names
-                is_used = is_used or name in mentioned or _is_of_ros(kind.noun, name)
+                is_used = is_used or name in mentions.names or _is_of_ros(kind.noun, name)
                 text = f"{kind.noun} '{name}' is declared, and {kind.unused}"
                 rule, advice = f'unused-{kind.slug}', 'remove it, or use it in a behaviour'
                 note(entity.path, rule, text, advice, is_used=is_used)
-        touched = mentioned.union(*({*each.state_set, *each.state_tested} for each in uses))
+        touched = mentions.names.union(*({*each.state_set, *each.state_tested} for each in uses))
         touched |= {use.name for each in uses for use in each.state_read}
         is_open = not uses or any(each.is_state_open for each in uses)
         for name in node.state:

@@ -328,6 +328,14 @@ class F:
             False,
         ),
         ('json.loads().node.create_publisher(MSG, sys.argv[1])', "node.publish('x', '')", False),
+        (
+            "json.loads('').node.create_publisher(msg_type=MSG, topic='x')",
+            "node.publish('x', '')",
+            False,
+        ),
+        ("f = json.loads('').create_publisher; f(MSG, 'x')", "node.publish('x', '')", False),
+        ("for k in 'xy': setattr(json.loads('').state, k, 1)", 'node.state.x', False),
+        ("for k in 'xy': json.loads('').own_state[k] = 1", "node.own_state['x']", False),
         ("json.loads('').node.create_publisher(MSG, 'y')", "node.publish('x', '')", True),
         (
             "print(json.loads('').x, json.loads('').state.x, json.loads('').own_state['x'])",
