@@ -644,9 +644,12 @@ class Walk:
         top = scope.module.top
         if top.is_open or top.is_dynamic or node.id in top.all_stored or node.id[:2] == '__':
             return
-        if self._names.top_value(scope.module, node.id) is None:
+        within: Scope | None = scope
+        while within is not None and node.id not in within.arguments:
+            within = within.outer
+        if within is None and self._names.top_value(scope.module, node.id) is None:
             text = f"'{node.id}' is not defined"
-            help_text = suggest(node.id, top.all_stored)
+            help_text = suggest(node.id, top.all_stored | scope.arguments)
             self.run.report('undefined-name', scope.module, node, text, help_text)
 
     def _subscript(self, node: ast.Subscript, scope: Scope) -> None:

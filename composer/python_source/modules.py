@@ -135,8 +135,9 @@ class TopNames:
 
     @cached_property
     def all_stored(self) -> frozenset[str]:
-        """All names that the module stores anywhere."""
-        return frozenset(name for node in self._nodes for name in bound_names(node))
+        """All names that the module stores anywhere, but as parameters."""
+        nodes = (node for node in self._nodes if not isinstance(node, ast.arg))
+        return frozenset(name for node in nodes for name in bound_names(node))
 
     @cached_property
     def _nodes(self) -> list[ast.AST]:

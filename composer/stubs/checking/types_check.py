@@ -194,7 +194,7 @@ def _own_names(
                     own.add(name)
                 case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Store()):
                     own.add(owner)
-                case ast.Constant(value=str(name)) if name:
+                case ast.arg(arg=name) | ast.Constant(value=str(name)) if name:
                     defined.add(name)
         attributes |= {*+stored}
         defined |= top.all_stored - {name for name, _ in imports}

@@ -152,6 +152,8 @@ def test_the_parameter_that_was_forgotten_is_named(check, behaviour, advice):
     ('code', 'rules'),
     [
         ('def on_start(self, state): open(node)', ['undefined-name']),
+        ('def on_start(self, state): open(node)\n    def x(self, node): 1', ['undefined-name']),
+        ('def on_start(self, node): (lambda: (lambda: open(node))())()', []),
         ('def on_start(self, node, state): pass', ['bad-signature']),
         ('def on_start(self, node): pass', ['unused-parameter', 'unused-publisher']),
     ],
