@@ -25,6 +25,7 @@ from composer.python_source.syntax import (
     list_arguments,
     own_nodes,
     positional_names,
+    visible_names,
     wrapper_of,
 )
 from composer.records import record
@@ -192,6 +193,7 @@ class Names:
         self.walked = 0
         self.kind_of = cache(_kind_of)
         self.stored_in = cache(find_stored)
+        self._visible_in = cache(visible_names)
         self._members_of = cache(_Members)
         self._steps = 0
 
@@ -218,6 +220,13 @@ class Names:
     def is_local(self, name: str, scope: Scope) -> bool:
         """Return whether a name is one of a function."""
         return name in self.stored_in(scope.definition) or name in scope.arguments
+
+    def defined_in(self, scope: Scope) -> frozenset[str]:
+        """Return the names that a function, those around it, and its module define."""
+        if scope.definition is None:
+            return frozenset({*scope.module.top.statements, *scope.module.top.stored_again})
+        outer = scope.outer or Scope(scope.module)
+        return self._visible_in(scope.definition) | self.defined_in(outer)
 
     # Expressions
 

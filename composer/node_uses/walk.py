@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import importlib.util
 import re
 from functools import cache
@@ -281,8 +282,10 @@ class Walk:
             case ast.Assign(targets=targets, value=value):
                 self._assign(targets, value, scope)
             case _:
+                # Functions do not evaluate the annotations of their names.
+                annotation = getattr(node, 'annotation', None)
                 for child in list_children(node):
-                    if isinstance(child, ast.expr):
+                    if isinstance(child, ast.expr) and child is not annotation:
                         self.visit(child, scope)
 
     def _note_globals(self, names: Sequence[str], scope: Scope) -> None:
@@ -641,15 +644,17 @@ class Walk:
             self.visit(owner, scope)
 
     def _check_defined(self, node: ast.Name, scope: Scope) -> None:
-        top = scope.module.top
-        if top.is_open or top.is_dynamic or node.id in top.all_stored or node.id[:2] == '__':
+        top, name = scope.module.top, node.id
+        if top.is_open or top.is_dynamic or name[:2] in ('_', '__') or hasattr(builtins, name):
             return
-        within: Scope | None = scope
-        while within is not None and node.id not in within.arguments:
-            within = within.outer
-        if within is None and self._names.top_value(scope.module, node.id) is None:
-            text = f"'{node.id}' is not defined"
-            help_text = suggest(node.id, top.all_stored | scope.arguments)
+        defined = self._names.defined_in(scope)
+        if name not in defined:
+            help_text = suggest(name, defined)
+            for own, value in scope.given.items():
+                if isinstance(value, Instance) and self._names.attribute(value, name):
+                    help_text = f'write {own}.{name}'
+            help_text = 'take node as a parameter' if name == 'node' else help_text
+            text = f"'{name}' is not defined"
             self.run.report('undefined-name', scope.module, node, text, help_text)
 
     def _subscript(self, node: ast.Subscript, scope: Scope) -> None:

@@ -83,6 +83,18 @@ def bound_names(node: ast.AST) -> list[str]:
     return []
 
 
+def visible_names(definition: ast.AST) -> frozenset[str]:
+    """Return the names that a function takes or binds, in classes in it as well."""
+    found: set[str] = set()
+    pending = list_children(definition)
+    while pending:
+        node = pending.pop()
+        found.update(bound_names(node))
+        if not isinstance(node, (*FUNCTIONS, ast.Lambda)):
+            pending += list_children(node)
+    return frozenset(found)
+
+
 def stored_names(node: ast.AST) -> set[str]:
     """Return the names that code assigns or deletes, in functions in it as well."""
     names = [each for each in ast.walk(node) if isinstance(each, ast.Name)]
