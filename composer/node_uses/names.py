@@ -165,7 +165,7 @@ _MADE = frozenset(
 _WRAPS = External('functools.wraps')
 _INSTALLED = {'site-packages', 'dist-packages'}
 # An expression that is assigned to a name, or whose items are; `None` for what is not shown.
-Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | None, bool]'
+Stored: TypeAlias = 'tuple[ast.expr | FunctionNode | ast.Import | ast.ImportFrom | None, bool]'
 # The arguments of `getattr` without a default.
 _GETATTR = 2
 # Longer ways from a name to its value are not followed.
@@ -265,7 +265,7 @@ class Names:
         while within is not None and within.definition is not None:
             stored = self.stored_in(within.definition).get(name)
             if stored is not None:
-                return self._stored_value(stored, within)
+                return self._stored_value(name, stored, within)
             if name in within.given:
                 return within.given[name]
             if name in within.arguments:
@@ -273,13 +273,15 @@ class Names:
             within = within.outer
         return self.top_value(scope.module, name)
 
-    def _stored_value(self, stored: list[Stored], scope: Scope) -> Value | None:
+    def _stored_value(self, name: str, stored: list[Stored], scope: Scope) -> Value | None:
         expression, is_item = stored[0]
         if len(stored) > 1 or expression is None:
             return None
         if isinstance(expression, FUNCTIONS):
             is_plain = not expression.decorator_list
             return Function(scope.module, expression, None, scope) if is_plain else None
+        if isinstance(expression, ast.Import | ast.ImportFrom):
+            return self._imported(self.full_name(scope.module, expression, name))
         if not is_item:
             return self.value_of(expression, scope)
         if isinstance(expression, ast.Tuple | ast.List):
@@ -486,9 +488,9 @@ def find_stored(definition: ast.AST | None) -> dict[str, list[Stored]]:
                 shown.add(id(target))
                 found.setdefault(target.id, []).append((value, is_item))
     for node in nodes:
-        function = node if isinstance(node, FUNCTIONS) else None
+        known = node if isinstance(node, (*FUNCTIONS, ast.Import, ast.ImportFrom)) else None
         for name in bound_names(node) if id(node) not in shown else ():
-            found.setdefault(name, []).append((function, False))
+            found.setdefault(name, []).append((known, False))
     return {name: several for name, several in found.items() if name not in shared}
 
 

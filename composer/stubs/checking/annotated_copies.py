@@ -180,14 +180,9 @@ class _Edit:
 
 @record
 class AnnotatedCopy:
-    """A module, and the changes that make its annotated copy.
-
-    Attributes:
-        kept: The types of attributes that are one type wherever they are not `None`.
-    """
+    """A module, and the changes that make its annotated copy, with the lines at its end."""
 
     module: ProjectModule
-    kept: Mapping[str, str]
     _edits: tuple[_Edit, ...]
     _end: tuple[str, ...]
 
@@ -287,7 +282,7 @@ class Annotator:
         for top in module.tree.body:
             if isinstance(top, ast.ClassDef):
                 edits += self._attributes(top, lines)
-        return AnnotatedCopy(module, self.kept, tuple(sorted(edits)), tuple(self._imports.lines()))
+        return AnnotatedCopy(module, tuple(sorted(edits)), tuple(self._imports.lines()))
 
     def _edit(self, use: FunctionUse, lines: list[str]) -> Iterator[_Edit]:
         arguments = use.definition.args

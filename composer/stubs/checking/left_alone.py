@@ -55,6 +55,13 @@ class ReportedPlace:
         return [node for node in self.nodes if isinstance(node, ast.expr)]
 
     @property
+    def whole(self) -> list[ast.expr]:
+        """The expressions that are just where the report is."""
+        line = self.report.end_line
+        end = line, self.copy.original_column(line, self.report.end_column)
+        return [each for each in self.values if self.copy.end(each) == end]
+
+    @property
     def calls(self) -> list[ast.Call]:
         """The calls that the report is in, innermost first."""
         return [node for node in self.around if isinstance(node, ast.Call)]

@@ -26,7 +26,7 @@ from composer.python_source.syntax import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from composer.node_uses.names import Value
     from composer.python_source.module_finder import ModuleFinder
@@ -44,8 +44,12 @@ _DEEPEST = 8
 class Origins(Names):
     """What names stand for, also of what methods and sums give, and of items of anything."""
 
-    def __init__(self, finder: ModuleFinder, functions: Iterable[FunctionUse]) -> None:
+    def __init__(
+        self, finder: ModuleFinder, functions: Iterable[FunctionUse], kept: Collection[str]
+    ) -> None:
         super().__init__(finder)
+        # The attributes of one type.
+        self._kept = kept
         self._uses = {id(use.definition): use for use in functions}
 
     def find(self, place: ReportedPlace, value: ast.expr) -> Value | None:
@@ -60,7 +64,7 @@ class Origins(Names):
         """
         return self._knows(value, self._scope(place), with_state, 0)
 
-    def _knows(self, node: ast.expr, scope: Scope, with_state: bool, depth: int) -> bool:  # noqa: FBT001, PLR0911
+    def _knows(self, node: ast.expr, scope: Scope, with_state: bool, depth: int) -> bool:  # noqa: C901, FBT001, PLR0911
         def knows(each: ast.expr, within: Scope = scope) -> bool:
             return depth < _DEEPEST and self._knows(each, within, with_state, depth + 1)
 
@@ -77,24 +81,36 @@ class Origins(Names):
         match node:
             case ast.Name(id=name):
                 return self._knows_name(name, scope, depth)
-            case ast.Call(func=func, args=arguments):
-                called = self.value_of(func, scope)
-                if isinstance(called, Function):
-                    nodes = [*own_nodes(called.definition)]
-                    given = {
-                        name: each for name, each in self.bind(called, node, scope).items() if each
-                    }
-                    within = Scope(called.module, called.definition, given, called.scope)
-                    returned = [each.value for each in nodes if isinstance(each, ast.Return)]
-                    return all(each is None or knows(each, within) for each in returned)
-                of = func.value if called is None and isinstance(func, ast.Attribute) else func
-                return knows(of) and all(map(knows, arguments))
-            case ast.Attribute() | ast.NamedExpr() | ast.Yield() | ast.YieldFrom():
+            case ast.Call():
+                return self._knows_call(node, scope, knows)
+            case ast.Attribute(value=ast.Name(), attr=name):
+                return name in self._kept
+            case ast.Attribute(value=inner):
+                # What messages that are kept have.
+                return knows(inner)
+            case ast.NamedExpr() | ast.Yield() | ast.YieldFrom():
                 return False
             case ast.ListComp() | ast.SetComp() | ast.GeneratorExp():
                 return knows(node.elt, _inside(node, scope))
+            case ast.IfExp(body=body, orelse=other):
+                return knows(body) and knows(other)
         parts = [each for each in list_children(node) if isinstance(each, ast.expr)]
         return not isinstance(node, ast.DictComp) and all(map(knows, parts))
+
+    def _knows_call(
+        self, call: ast.Call, scope: Scope, knows: Callable[[ast.expr, Scope], bool]
+    ) -> bool:
+        called, func = self.value_of(call.func, scope), call.func
+        if not isinstance(called, Function):
+            # The method of a value returns what its type says.
+            is_method = called is None and isinstance(func, ast.Attribute)
+            of = func.value if is_method and isinstance(func, ast.Attribute) else func
+            return all(knows(each, scope) for each in (of, *call.args))
+        given = {name: each for name, each in self.bind(called, call, scope).items() if each}
+        within = Scope(called.module, called.definition, given, called.scope)
+        nodes = own_nodes(called.definition)
+        returned = [each.value for each in nodes if isinstance(each, ast.Return)]
+        return all(each is None or knows(each, within) for each in returned)
 
     def _knows_name(self, name: str, scope: Scope, depth: int) -> bool:
         def knows(each: ast.expr, within: Scope) -> bool:

@@ -40,10 +40,12 @@ bad-argument-type = true
 bad-return = true
 bad-specialization = true
 incompatible-comparison = true
+missing-argument = true
 missing-attribute = true
 no-matching-overload = true
 not-callable = true
 not-iterable = true
+unbound-name = true
 unexpected-keyword = true
 unsupported-operation = true
 """

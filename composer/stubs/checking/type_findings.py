@@ -34,7 +34,7 @@ from composer.stubs.checking.origins import INTERFACE, OF_PYTHON, Origins
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
@@ -64,6 +64,8 @@ _MEANT = re.compile(r'Did you mean `(\w+)`')
 _MESSAGE = re.compile(r'^(\w+)\.(msg|srv|action)\.(\w+)\.(\w+)$')
 _LITERAL = re.compile(r"Literal\[('[^']*'|-?\d+|True|False|b'[^']*')\]")
 _TIME = re.compile(r'^rclpy\.\w+\.Rclpy(Time|Duration)\.__init__$')
+_MISSING = re.compile(r'Missing argument `(\w+)` in function `(?:\w+\.)*(\w+)\.__init__`')
+_UNBOUND = re.compile(r'`(\w+)` is uninitialized')
 _OVERLOADED = re.compile(r'No matching overload found for function `([\w.]+)`')
 _UNARY = re.compile(r'Type `([^`]+)` is not iterable')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
@@ -127,6 +129,7 @@ class TypeFindings:
         stored: The attributes of these alone.
         closed: Its classes that have what is written out alone.
         bases: What its classes inherit from.
+        kept: The attributes of one type.
         types: Those of values that were asked for, by the identities of their syntax trees.
     """
 
@@ -141,6 +144,7 @@ class TypeFindings:
     stored: frozenset[str]
     closed: Mapping[str, ast.ClassDef]
     bases: frozenset[str]
+    kept: Collection[str]
     types: dict[int, str]
 
     @cached_property
@@ -155,7 +159,7 @@ class TypeFindings:
 
     @cached_property
     def _origins(self) -> Origins:
-        return Origins(self.context.modules, self.functions.values())
+        return Origins(self.context.modules, self.functions.values(), self.kept)
 
     def ask(self, copy: AnnotatedCopy, reports: Sequence[TypeReport]) -> list[ast.expr]:
         """Return the values whose types tell more of reports."""
@@ -180,7 +184,7 @@ class TypeFindings:
             if report.kind == 'reveal-type' and value is not None:
                 # What is known of its attributes comes last.
                 shown = report.message.removeprefix('revealed type: ').partition(' (_.')[0]
-                self.types[id(value)] = shown
+                self.types[id(value)] = shown.removeprefix('Self@')
 
     def explain_all(
         self, copy: AnnotatedCopy, reports: Sequence[TypeReport]
@@ -218,10 +222,12 @@ class TypeFindings:
             'bad-specialization': self._bound,
             'incompatible-comparison': self._comparison,
             'invalid-yield': self._return,
+            'missing-argument': self._missing,
             'missing-attribute': self._attribute,
             'no-matching-overload': self._argument,
             'not-callable': self._called,
             'not-iterable': self._iteration,
+            'unbound-name': self._unbound,
             'unexpected-keyword': self._keyword,
             'unsupported-operation': self._operation,
         }
@@ -284,7 +290,13 @@ class TypeFindings:
         advice = did_you_mean(meant or None)
         of_interface = INTERFACE.search(imports.get(owner, ''))
         is_certain = bool(meant) and name not in self.defined and _is_misspelt(name, meant)
-        if owner in _PLAIN_OWNERS and not is_certain:
+        if owner == 'object' and isinstance(node.value, ast.Call):
+            # Of `super()`: no base has it.
+            classes = (each for each in place.around if isinstance(each, ast.ClassDef))
+            of = next(classes, None)
+            is_certain = of is not None and of.name in self.closed and of.name not in self.bases
+            advice = 'remove it: the class inherits from nothing'
+        elif owner in _PLAIN_OWNERS and not is_certain:
             is_certain = self._is_certain(place, node.value)
             advice = 'this is the value itself' if name == 'value' else advice
         elif owner in self.closed and not is_certain:
@@ -640,6 +652,21 @@ class TypeFindings:
         method = function[1].removesuffix('.__init__').rpartition('.')[2].removeprefix('Rclpy')
         return place.calls[0], 'bad-call', f"{method}() takes no argument '{keyword[1]}'", None
 
+    def _missing(self, place: ReportedPlace) -> _Problem | None:
+        """Return that an object of the project is made without one of its values."""
+        found = _MISSING.search(place.report.message)
+        if found is None or found[2] not in self.closed or not place.calls:
+            return None
+        message = f"{found[2]}() is called without '{found[1]}'"
+        return place.calls[0], 'bad-call', message, None
+
+    def _unbound(self, place: ReportedPlace) -> _Problem | None:
+        """Return a name that a function gives a value only later."""
+        found = _UNBOUND.match(place.report.message)
+        if found is None or not place.values:
+            return None
+        return place.values[0], 'undefined-name', f"'{found[1]}' has no value here yet", None
+
     def _count(self, place: ReportedPlace) -> _Problem | None:
         function = _FUNCTION.search(place.report.message)
         match = _MESSAGE.match(function[1]) if function else None
@@ -659,7 +686,7 @@ class TypeFindings:
         if _INDEXED.search(place.report.message):
             return self._index(place)
         match = _OPERANDS.search(place.report.message)
-        values = [node for node in place.values if isinstance(node, ast.BinOp | ast.Compare)]
+        values = [each for each in place.whole if isinstance(each, ast.BinOp | ast.Compare)]
         if match is None or not values:
             return None
         several = [_alternatives(each) for each in (match[2], match[3])]

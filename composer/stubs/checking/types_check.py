@@ -80,6 +80,7 @@ def find_type_errors(
         attributes,
         _closed_classes(written),
         frozenset(base for each in written for base in words_in(*each.bases)),
+        annotator.kept.keys(),
         {},
     )
     asked = {path: findings.ask(copy, reports[path]) for path, copy in copies.items()}

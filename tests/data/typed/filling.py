@@ -66,3 +66,22 @@ def follow(node, path):
     node.logger.info(', '.join(path.header))  # error
     node.logger.info(path.header())  # error
     return True, 'followed'
+
+
+class Walker:
+    def __init__(self, node):
+        super().__init__('walker')
+        self.legs = [Leg(1.0)]
+        self.first = None
+
+    def step(self, node):
+        from diagnostic_msgs.msg import DiagnosticStatus as Status
+
+        self.first = Leg()  # error
+        self.first.grow(2.0)  # error
+        level = Status.OK if self.legs else Status.ERROR
+        if level == 0:  # error
+            steps = steps + 1  # error
+            node.logger.info(f'{steps}')
+        node.publish('cmd', self)  # error
+        super().step(node)  # error

@@ -49,6 +49,9 @@ class Follower:
         node.logger.info(f'{(node.now() - self.started).nanosecond}')  # error
         node.logger.info(f'{node.now() - node.state.stamp}')  # error
         node.logger.info(f'{node.state.place.pose.position}')
+        node.logger.info(f'{self.last.pose.positions}')  # error
+        if node.now() - self.started > 2.0:  # error
+            self.last.pose.pose.position.x = 'far'  # error
 
     def turn(self, node, path):
         for pose in path.poses:
