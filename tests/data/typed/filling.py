@@ -81,7 +81,7 @@ class Walker:
         self.first.grow(2.0)  # error
         level = Status.OK if self.legs else Status.ERROR
         if level == 0:  # error
-            steps = steps + 1  # error
+            steps = steps + 1  # noqa: F821  # error
             node.logger.info(f'{steps}')
         node.publish('cmd', self)  # error
         super().step(node)  # error
