@@ -19,6 +19,7 @@ from composer.python_source.syntax import (
     FUNCTIONS,
     FunctionNode,
     bound_names,
+    home_of,
     imported_names,
     inner_of,
     is_none,
@@ -304,7 +305,7 @@ class Names:
         statements = top.statements.get(name, [])
         if not statements:
             is_builtin = not top.is_open and hasattr(builtins, name)
-            return External(f'builtins.{name}') if is_builtin else None
+            return External(f'builtins.{name}') if is_builtin else self._starred(module, name)
         statement, is_conditional = statements[0]
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
         if name in top.stored_again and not isinstance(statement, ast.Assign):
@@ -320,6 +321,17 @@ class Names:
             return self._top_value(module, statement, name)
         finally:
             self._followed.discard(key)
+
+    def _starred(self, module: ModuleSource, name: str) -> Value | None:
+        """Return what a name stands for in a module from which all names are imported."""
+        starred = [each for each, _ in module.top.statements.get('*', ())]
+        for statement in starred if name[:1] not in ('*', '_') else ():
+            if isinstance(statement, ast.ImportFrom):
+                own = self.name_of(module)
+                home = self.find_module(home_of(statement, own, is_package=module.is_package))
+                if home is not None and home is not module and name in home.top.statements:
+                    return self.top_value(home, name)
+        return None
 
     def _top_value(self, module: ModuleSource, statement: ast.AST, name: str) -> Value | None:
         match statement:

@@ -340,7 +340,9 @@ class Run:
         state_doubts: Likewise, on which what is kept in the state does.
         held_states: The names of the state of which one of the latter is that they hold.
         fixed: Those of the first that hang on a constant, a type or the node's name.
-        guards: The number of statements around it that catch what a wrong name raises.
+        kinds: Those of these that it is on a branch of.
+        guards: The number of statements around it that catch what a wrong name raises, and of
+            those branches.
         broad_guards: The number of statements around it that catch everything.
         held_locks: The locks that are held, and the lines where they were taken.
         calls: Where the functions under way are called.
@@ -353,6 +355,7 @@ class Run:
         self.branches = 0
         self.state_doubts = 0
         self.fixed = 0
+        self.kinds = 0
         self.held_states: tuple[str, ...] = ()
         self.guards = 0
         self.broad_guards = 0
@@ -383,8 +386,10 @@ class Run:
         self.doubt(chosen, held)
         is_of_file = chosen in ('file', 'fixed')
         self.branches += is_of_file
+        self.kinds += chosen == 'fixed'
         with self.guard(is_guard=chosen == 'fixed'):
             yield
+        self.kinds -= chosen == 'fixed'
         self.branches -= is_of_file
         self.standing = before
 

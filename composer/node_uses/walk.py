@@ -200,7 +200,8 @@ class Walk:
 
     def _note_place(self, node: ast.AST) -> None:
         run = self.run
-        here = (bool(run.guards or run.broad_guards), run.branches > 0, run.doubts > 0)
+        is_caught = run.guards > run.kinds or run.broad_guards > 0
+        here = (is_caught, run.branches > 0, run.doubts > 0)
         self.places[id(node)] = min(here, self.places.get(id(node), here))
 
     def _follow(

@@ -190,6 +190,8 @@ class _Values(Names):
         match self.value_of(call.func, scope):
             case Chain(path=('node', 'now')):
                 return Chain(('made', 'rclpy.time:Time'))
+            case Chain(path=('node', 'send_goal')):
+                return Chain(('made', 'composer_stubs:Goal'))
             case Chain(path=('made', name, 'to_msg')) if ':' in name:
                 return Chain(('made', f'builtin_interfaces/msg/{name.partition(":")[2]}'))
             case External(name=name) if name in _TIMES:

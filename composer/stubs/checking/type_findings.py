@@ -395,7 +395,10 @@ class TypeFindings:
             description = self.context.types.describe(f'{match[1]}/{match[2]}/{match[3]}')
             if description is None:
                 return None
-            return self._misfit(description, field, value, given, is_stored=True)
+            wanted_field = description.field(field)
+            if wanted_field is None:
+                return None
+            return self._entry(description, field, wanted_field.type, value, given, is_stored=True)
         if function == 'list.append' and self._is_item(place, value, wanted, given):
             message = f'expected {self._shown(wanted)}, got {self._shown(given)}'
             return value, 'field-type', message, _call_of(value, given)
@@ -540,17 +543,31 @@ class TypeFindings:
         return None
 
     def _entry(
-        self, description: MessageDescription, name: str, of_type: FieldType, value: ast.expr
+        self,
+        description: MessageDescription,
+        name: str,
+        of_type: FieldType,
+        value: ast.expr,
+        given: str = '',
+        *,
+        is_stored: bool = False,
     ) -> _Problem | None:
+        """Return what is wrong with the value of a field, or with one of its items."""
         nested = of_type.nested and self.context.types.describe(of_type.nested)
         if isinstance(value, ast.List) and of_type.array:
-            items = (self._entry(description, name, of_type.item, each) for each in value.elts)
-            return next((each for each in items if each), None)
-        if isinstance(value, ast.Dict) and nested and not of_type.array:
+            found = [
+                self._entry(
+                    description, name, of_type.item, each, is_stored=is_stored and _keeps(of_type)
+                )
+                for each in value.elts
+            ]
+            if any(found):
+                return next(filter(None, found))
+        if isinstance(value, ast.Dict) and nested and not (of_type.array or is_stored):
             return self._display(nested, value)
-        given = self.types.get(id(value), '') or _type_of(value)
+        given = self.types.get(id(value), '') or _type_of(value) or given
         given = given or _TYPES_OF_DISPLAYS.get(type(value), '')
-        return self._misfit(description, name, value, given, of_type)
+        return self._misfit(description, name, value, given, of_type, is_stored=is_stored)
 
     def _misfit(
         self,
@@ -601,7 +618,8 @@ class TypeFindings:
             return bool(nested) and not (wanted.array or is_stored)
         if wanted.array and base in _COLLECTIONS:
             is_plain = base in ('list', 'set') and bool(inner)
-            return not is_plain or self._may_fit(wanted.item, inner, is_stored=is_stored)
+            is_kept = is_stored and _keeps(wanted)
+            return not is_plain or self._may_fit(wanted.item, inner, is_stored=is_kept)
         if wanted.nested and not wanted.array:
             if nested and len(nested.fields) == 1 and not is_stored:
                 return self._may_be(nested.fields[0].type, given, is_stored)
@@ -816,6 +834,11 @@ def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
         ]
     names = [words_in(each) - {'None', 'Optional'} for each in written if each is not None]
     return bool(names) and all(len(each) == 1 for each in names)
+
+
+def _keeps(array: FieldType) -> bool:
+    """Return whether a message keeps the items of an array as they are; it converts numbers."""
+    return bool(array.nested) or array.kind == 'byte'
 
 
 def _alternatives(given: str) -> list[str]:

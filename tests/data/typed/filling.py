@@ -34,6 +34,8 @@ def fill(node, odometry):
     path.poses = [pose]  # error
     path.poses = [PoseStamped(pose=each) for each in (pose, Pose())]
     path.poses.append(pose)  # error
+    odometry.pose.covariance = [pose.position.x, 0, 0.0] * 12
+    odometry.twist.covariance = [0] * 36
     node.publish('joints', {'name': [Step.IDLE], 'position': [pose.position.x]})  # error
     node.publish('joints', {'name': Step.IDLE.name, 'position': [pose.position.x]})  # error
     node.publish('joints', {'name': ['a'], 'position': [pose.position.x, 1]})
