@@ -134,12 +134,6 @@ class TopNames:
         return _stored_attributes(self._nodes)
 
     @cached_property
-    def all_stored(self) -> frozenset[str]:
-        """All names that the module stores anywhere, but as parameters."""
-        nodes = (node for node in self._nodes if not isinstance(node, ast.arg))
-        return frozenset(name for node in nodes for name in bound_names(node))
-
-    @cached_property
     def _nodes(self) -> list[ast.AST]:
         return list_nodes(self._body)
 

@@ -19,10 +19,12 @@ from composer.node_uses.names import (
     find_stored,
 )
 from composer.python_source.syntax import (
+    list_arguments,
     list_children,
     own_nodes,
     positional_names,
     stored_names,
+    words_in,
 )
 
 if TYPE_CHECKING:
@@ -122,7 +124,9 @@ class Origins(Names):
                 known = (isinstance(each, ast.expr) and knows(each, within) for each, _ in stored)
                 return all(known)
             if name in within.arguments:
-                return False
+                arguments = list_arguments(within.definition.args)
+                written = [each.annotation for each in arguments if each.arg == name]
+                return len(words_in(*written) - {'None', 'Optional'}) == 1
             within = within.outer
         return False
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import re
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -22,9 +23,7 @@ from composer.node_uses.names import (
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import (
-    list_arguments,
     owner_of,
-    stored_names,
     words_in,
 )
 from composer.records import record
@@ -34,7 +33,7 @@ from composer.stubs.checking.origins import INTERFACE, OF_PYTHON, Origins
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Related
@@ -115,6 +114,25 @@ _PLAIN_OWNERS = _SCALARS | {'array', 'list', 'Mapping'}
 
 
 @record
+class OwnCode:
+    """What is known of a project's own code.
+
+    Attributes:
+        names: Those of classes that it defines, changes, or imports from elsewhere.
+        stored: The attributes that it gives to classes and objects; with an empty text, any.
+        classes: Those that have what is written out, or what their bases have, alone.
+        bases: What its classes inherit from.
+        kept: The attributes that are of one type, beside `None`.
+    """
+
+    names: frozenset[str]
+    stored: frozenset[str]
+    classes: Mapping[str, ast.ClassDef]
+    bases: frozenset[str]
+    kept: frozenset[str]
+
+
+@record
 class TypeFindings:
     """Turns reports into findings.
 
@@ -123,13 +141,7 @@ class TypeFindings:
         shapes: What each of these classes has.
         functions: What is known of the project's functions.
         messages: The full names of messages, by their classes; of one that several have, empty.
-        own: The names that the project itself defines, or imports from elsewhere.
         modules: The names of its modules.
-        defined: What it gives to classes and objects; with an empty text, any name.
-        stored: The attributes of these alone.
-        closed: Its classes that have what is written out alone.
-        bases: What its classes inherit from.
-        kept: The attributes of one type.
         types: Those of values that were asked for, by the identities of their syntax trees.
     """
 
@@ -138,28 +150,23 @@ class TypeFindings:
     shapes: Mapping[str, NodeShape]
     functions: Mapping[FunctionKey, FunctionUse]
     messages: Mapping[str, str]
-    own: frozenset[str]
     modules: frozenset[str]
-    defined: frozenset[str]
-    stored: frozenset[str]
-    closed: Mapping[str, ast.ClassDef]
-    bases: frozenset[str]
-    kept: Collection[str]
-    types: dict[int, str]
+    own: OwnCode
+    types: dict[int, str] = field(default_factory=dict)
 
     @cached_property
     def _plain(self) -> frozenset[str]:
-        """The closed classes whose objects stand for nothing else."""
+        """The classes whose objects stand for nothing else."""
         return frozenset(
             name
-            for name, each in self.closed.items()
-            if not words_in(*each.bases) & {'NamedTuple'}
+            for name, each in self.own.classes.items()
+            if words_in(*each.bases) <= {'ABC', 'Enum', 'Flag', 'object'}
             and not {getattr(part, 'name', '') for part in each.body} & _CONVERTING
         )
 
     @cached_property
     def _origins(self) -> Origins:
-        return Origins(self.context.modules, self.functions.values(), self.kept)
+        return Origins(self.context.modules, self.functions.values(), self.own.kept)
 
     def ask(self, copy: AnnotatedCopy, reports: Sequence[TypeReport]) -> list[ast.expr]:
         """Return the values whose types tell more of reports."""
@@ -204,7 +211,12 @@ class TypeFindings:
         node, rule, *_ = problem
         if place.report.kind in ('bad-argument-count', 'unexpected-keyword'):
             return True
-        if rule not in ('field-type', 'unknown-field') or 'parameters' in words_in(node):
+        if 'parameters' in words_in(node):
+            return False
+        if rule == 'never-equal':
+            left = self._origins.find(place, getattr(node, 'left', node))
+            return not isinstance(left, Chain)
+        if rule not in ('field-type', 'unknown-field'):
             return False
         used: list[ast.expr] = [node, *place.calls]
         for each in place.around:
@@ -249,7 +261,7 @@ class TypeFindings:
 
     def _is_message(self, given: str) -> bool:
         """Return whether a class is that of one message, and of nothing in the project."""
-        return bool(self.messages.get(given)) and given not in self.own
+        return bool(self.messages.get(given)) and given not in self.own.names
 
     # Attributes
 
@@ -258,14 +270,16 @@ class TypeFindings:
         owner, name = match.groups() if match else ('', '_')
         found = (node for node in place.nodes if getattr(node, 'attr', '') == name)
         node, meant = next(found, None), _MEANT.search(place.report.message)
-        if name.startswith('__' if owner in self.own else '_') or name in place.copy.asked:
+        if name.startswith('__' if owner in self.own.names else '_') or name in place.copy.asked:
             return None
         if not isinstance(node, ast.Attribute) or isinstance(node.ctx, ast.Del):
             return None
         advice = did_you_mean(meant[1] if meant else None)
         of_node = owner.removesuffix('Parameters').removesuffix('State')
         is_part = owner in ('Coroutine', *_PARTS)
-        if owner in self.own or not (is_part or owner in self.messages or of_node in self.nodes):
+        if owner in self.own.names or not (
+            is_part or owner in self.messages or of_node in self.nodes
+        ):
             return self._attribute_elsewhere(place, owner, node, meant[1] if meant else '')
         if not self._is_certain(place, node.value, with_state=True):
             return None
@@ -289,21 +303,25 @@ class TypeFindings:
         name, imports = node.attr, place.copy.module.source.imports
         advice = did_you_mean(meant or None)
         of_interface = INTERFACE.search(imports.get(owner, ''))
-        is_certain = bool(meant) and name not in self.defined and _is_misspelt(name, meant)
+        is_certain = bool(meant) and name not in self.own.stored and _is_misspelt(name, meant)
         if owner == 'object' and isinstance(node.value, ast.Call):
             # Of `super()`: no base has it.
             classes = (each for each in place.around if isinstance(each, ast.ClassDef))
             of = next(classes, None)
-            is_certain = of is not None and of.name in self.closed and of.name not in self.bases
+            is_certain = (
+                of is not None and of.name in self.own.classes and of.name not in self.own.bases
+            )
             advice = 'remove it: the class inherits from nothing'
         elif owner in _PLAIN_OWNERS and not is_certain:
             is_certain = self._is_certain(place, node.value)
             advice = 'this is the value itself' if name == 'value' else advice
-        elif owner in self.closed and not is_certain:
-            is_certain = not {name, ''} & self.stored and self._is_certain(place, node.value)
-            # The object may be one of a class that inherits from this one.
-            is_own = place.function is not None and place.function in self.closed[owner].body
-            is_certain &= not (is_own and owner in self.bases)
+        elif owner in self.own.classes and not is_certain:
+            is_certain = not {name, ''} & self.own.stored and self._is_certain(place, node.value)
+            # Types of Python leave out private names, and the object may be of a class that
+            # inherits from this one.
+            is_certain &= not (name.startswith('_') and self.own.classes[owner].bases)
+            is_own = place.function is not None and place.function in self.own.classes[owner].body
+            is_certain &= not (is_own and owner in self.own.bases)
         elif of_interface and place.report.message.startswith('Class '):
             is_certain = True
             parts = _PARTS_OF_INTERFACES[of_interface[1]]
@@ -311,34 +329,10 @@ class TypeFindings:
         if owner == 'Mapping' and is_certain:
             owner = ast.unparse(node.value)
             advice = f"write {owner}['{name}']"
-        elif not (is_certain or self._is_set_by_nobody(place, owner, node)):
+        elif not is_certain:
             return None
         advice = self._place_of_constant(owner, name) or OF_RCLPY.get(name, advice)
         return node, 'unknown-attribute', f"'{owner}' has no attribute '{name}'", advice
-
-    def _is_set_by_nobody(self, place: ReportedPlace, owner: str, node: ast.Attribute) -> bool:
-        """Return whether an attribute of the object itself, or a constant, is set nowhere.
-
-        The object is made of just this class, as the file names it.
-        """
-        module, function = place.copy.module, place.function
-        if {node.attr, ''} & self.defined:
-            return False
-        classes = [each for each in ast.walk(module.tree) if isinstance(each, ast.ClassDef)]
-        own = [each for each in classes if each.name == owner]
-        if node.attr.isupper() and place.report.message.startswith('Class '):
-            return bool(own)
-        names = (call.behaviour for use in self.functions.values() for call, _ in use.bindings)
-        bound = {(each.module, each.class_name) for each in names}
-        receiver = function.args.args[0].arg if function and function.args.args else None
-        bases = {getattr(base, 'id', '') for each in classes for base in each.bases}
-        return (
-            (module.name, owner) in bound
-            and owner not in bases
-            and getattr(node.value, 'id', '') == receiver
-            and any(function in each.body for each in own)
-            and not any(each.decorator_list for each in own)
-        )
 
     def _place_of_constant(self, owner: str, name: str) -> str | None:
         """Return the help for a constant that a part of a service or an action has."""
@@ -370,8 +364,7 @@ class TypeFindings:
         # What is calculated with an unset value is unknown.
         types = {*_alternatives(self.types.get(id(value), ''))} - {'None', 'Unknown'}
         is_open = len(types) > 1 or 'Any' in types
-        is_known = self._origins.knows(place, value, with_state=with_state)
-        return not is_open and (is_known or _is_annotated(place, value))
+        return not is_open and self._origins.knows(place, value, with_state=with_state)
 
     # Arguments
 
@@ -452,11 +445,10 @@ class TypeFindings:
                 return None
             return value, 'bad-call', f'{message}{self._shown(given)}', None
         # Functions of the same module have no module before their names.
-        if function in self.defined or package in {
-            each.partition('.')[0] for each in self.modules
-        }:
+        own = {name for _, name in self.functions}
+        if function in own or package in {each.partition('.')[0] for each in self.modules}:
             return None
-        if given in self.nodes or (self.messages.get(given) and given not in self.own):
+        if given in self.nodes or (self.messages.get(given) and given not in self.own.names):
             what = 'a node' if given in self.nodes else self._shown(given)
             is_certain = self._is_certain(place, value, with_state=True)
         else:
@@ -673,7 +665,7 @@ class TypeFindings:
     def _missing(self, place: ReportedPlace) -> _Problem | None:
         """Return that an object of the project is made without one of its values."""
         found = _MISSING.search(place.report.message)
-        if found is None or found[2] not in self.closed or not place.calls:
+        if found is None or found[2] not in self.own.classes or not place.calls:
             return None
         message = f"{found[2]}() is called without '{found[1]}'"
         return place.calls[0], 'bad-call', message, None
@@ -769,7 +761,7 @@ class TypeFindings:
     def _called(self, place: ReportedPlace) -> _Problem | None:
         """Return an attribute that is no method, and is called."""
         owner = re.search(r'got `(\w+)`', place.report.message)
-        what = owner[1] if owner and owner[1] not in self.own else ''
+        what = owner[1] if owner and owner[1] not in self.own.names else ''
         for node in place.values:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 is_certain = what in _SCALARS and self._is_certain(place, node.func)
@@ -810,30 +802,6 @@ def _assigned(place: ReportedPlace) -> ast.expr | None:
     is_target = isinstance(getattr(place.values[0], 'ctx', None), ast.Store)
     assigned = (each.value for each in place.around if isinstance(each, ast.Assign))
     return next(assigned, None) if is_target else None
-
-
-def _is_annotated(place: ReportedPlace, value: ast.AST) -> bool:
-    """Return whether the project annotates what a value is of, with the name of one class."""
-    while isinstance(value, ast.Attribute) and not isinstance(value.value, ast.Name):
-        value = value.value
-    written: list[ast.expr | None] = []
-    function, root = place.function, getattr(value, 'value', value)
-    if (
-        function is not None
-        and isinstance(root, ast.Name)
-        and root.id not in stored_names(function)
-    ):
-        arguments = list_arguments(function.args)
-        written = [each.annotation for each in arguments if each.arg == root.id]
-    if not any(written) and isinstance(value, ast.Attribute):
-        classes = (each for each in place.around if isinstance(each, ast.ClassDef))
-        written = [
-            each.annotation
-            for each in ast.walk(next(classes, ast.Pass()))
-            if isinstance(each, ast.AnnAssign) and ast.unparse(each.target) == ast.unparse(value)
-        ]
-    names = [words_in(each) - {'None', 'Optional'} for each in written if each is not None]
-    return bool(names) and all(len(each) == 1 for each in names)
 
 
 def _keeps(array: FieldType) -> bool:

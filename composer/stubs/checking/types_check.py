@@ -16,7 +16,7 @@ from composer.stubs.checking.annotated_copies import (
     find_received_values,
 )
 from composer.stubs.checking.type_checker import run_type_checker, version_of
-from composer.stubs.checking.type_findings import TypeFindings
+from composer.stubs.checking.type_findings import OwnCode, TypeFindings
 from composer.stubs.message_stubs import SUPPORT
 from composer.stubs.node_stubs import NodeShape, merge_shapes, write_nodes
 from composer.stubs.project_modules import all_nodes
@@ -31,7 +31,7 @@ from composer.stubs.system_stubs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping
     from pathlib import Path
 
     from composer.checks.context import CheckContext
@@ -65,23 +65,14 @@ def find_type_errors(
     files[f'{module.replace(".", "/")}.pyi'] = text_of(write_nodes(module, shapes))
     files |= stand_ins(context.spec.qos)
     version, reports = version_of(program), _run(program, copies, files)
-    own, defined, attributes = _own_names(modules)
-    syntax = (node for module in modules.values() for node in ast.walk(module.tree))
-    written = [node for node in syntax if isinstance(node, ast.ClassDef)]
     findings = TypeFindings(
         context,
         classes.nodes_by_name,
         shapes,
         annotator.functions,
         _message_classes(files),
-        own,
         frozenset(modules),
-        defined,
-        attributes,
-        _closed_classes(written),
-        frozenset(base for each in written for base in words_in(*each.bases)),
-        annotator.kept.keys(),
-        {},
+        _read_own_code(modules, annotator.kept),
     )
     asked = {path: findings.ask(copy, reports[path]) for path, copy in copies.items()}
     if any(asked.values()):
@@ -144,59 +135,49 @@ def _message_classes(files: dict[str, str]) -> dict[str, str]:
     return names
 
 
-# Classes and decorators that add no attributes but those of Python.
-_PLAIN_BASES = frozenset({'ABC', 'Enum', 'Flag', 'NamedTuple', 'object'})
+# Decorators that add no attributes.
 _PLAIN_DECORATORS = frozenset({'dataclass', 'dataclasses', 'final', 'total_ordering', 'unique'})
 
 
-def _closed_classes(classes: Sequence[ast.ClassDef]) -> dict[str, ast.ClassDef]:
-    """Return the classes whose attributes are all written out, by their names."""
-    names = Counter(each.name for each in classes)
-    closed: dict[str, ast.ClassDef] = {}
-    # One may come before its base.
-    for each in [*classes, *classes]:
-        marks = {
-            word for mark in each.decorator_list for word in words_in(getattr(mark, 'func', mark))
-        }
-        methods = {getattr(part, 'name', '') for part in each.body}
-        if (
-            names[each.name] == 1
-            and words_in(*each.bases) <= _PLAIN_BASES | closed.keys()
-            and marks <= _PLAIN_DECORATORS
-            and not each.keywords
-            and not methods & {'__getattr__', '__getattribute__'}
-        ):
-            closed[each.name] = each
-    return closed
+def _read_own_code(modules: Mapping[str, ProjectModule], kept: Collection[str]) -> OwnCode:
+    """Return what is known of a project's own code.
 
-
-def _own_names(
-    modules: Mapping[str, ProjectModule],
-) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
-    """Return the names of classes of which the stubs do not tell all, and all that are defined.
-
-    The first are classes that the modules define, import from anywhere but ROS, or add attributes
-    to; the second all names that their code may give to something, with an empty one for any; the
-    last those of them that are attributes.
+    Args:
+        kept: The attributes that are of one type by all that is stored there.
     """
-    own: set[str] = set()
-    defined: set[str] = set()
-    attributes: set[str] = set()
+    names, stored, annotated = set[str](), Counter[str](), set[str]()
+    classes: list[ast.ClassDef] = []
     for module in modules.values():
-        imports, top = module.source.imports.items(), module.source.top
-        own |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
-        stored = top.stored_attributes.copy()
+        imports = module.source.imports.items()
+        names |= {name for name, full_name in imports if not _OF_ROS.search(full_name)}
+        stored += module.source.top.stored_attributes
         for node in ast.walk(module.tree):
             match node:
                 case ast.AugAssign(target=ast.Attribute(attr=name)):
                     # It changes what is there already.
                     stored[name] -= 1
-                case ast.ClassDef(name=name):
-                    own.add(name)
+                case ast.ClassDef():
+                    classes.append(node)
                 case ast.Attribute(value=ast.Name(id=owner), ctx=ast.Store()):
-                    own.add(owner)
-                case ast.arg(arg=name) | ast.Constant(value=str(name)) if name:
-                    defined.add(name)
-        attributes |= {*+stored}
-        defined |= top.all_stored - {name for name, _ in imports}
-    return frozenset(own), frozenset(defined | attributes), frozenset(attributes)
+                    names.add(owner)
+                case ast.AnnAssign(target=ast.Attribute(attr=name), annotation=annotation):
+                    annotated |= {name} if len(words_in(annotation)) == 1 else set()
+    written = Counter(each.name for each in classes)
+    marks = {each.name: _words_of_decorators(each) for each in classes}
+    return OwnCode(
+        names=frozenset(names | written.keys()),
+        stored=frozenset(+stored),
+        classes={
+            each.name: each
+            for each in classes
+            if written[each.name] == 1
+            and marks[each.name] <= _PLAIN_DECORATORS
+            and not each.keywords
+        },
+        bases=frozenset(base for each in classes for base in words_in(*each.bases)),
+        kept=frozenset(annotated.union(kept)),
+    )
+
+
+def _words_of_decorators(of: ast.ClassDef) -> set[str]:
+    return words_in(*(getattr(mark, 'func', mark) for mark in of.decorator_list))
