@@ -96,6 +96,29 @@ def test_a_message_that_is_passed_on_to_another_type_is_found(typed):
     assert finding.message.endswith('expected int32, got std_msgs/msg/String')
 
 
+def test_the_help_names_what_takes_a_message(typed):
+    Path('aside.py').write_text(
+        'def hear(node, m):\n'
+        "    node.publish('pose', m)\n"
+        "    node.publish('path', m.header)\n"
+        "    node.publish('path', m.pose)\n"
+    )
+    Path('aside.yaml').write_text(
+        'version: 1\nnodes:\n  n:\n'
+        '    publishers:\n'
+        '      pose: {type: geometry_msgs/msg/PoseStamped, external: true}\n'
+        '      path: {type: nav_msgs/msg/Path, external: true}\n'
+        '      odometry: {type: nav_msgs/msg/Odometry, external: true}\n'
+        '    subscriptions:\n'
+        '      in: {type: nav_msgs/msg/Odometry, external: true, behaviour: aside:hear}\n'
+    )
+    assert [(each.span.line, each.help) for each in find_by_types(Path('aside.yaml'))] == [
+        (2, "'odometry' is of this type"),
+        (3, 'give it by the name of its field: header'),
+        (4, None),
+    ]
+
+
 def test_the_help_writes_the_value_of_the_code(typed):
     Path('small.py').write_text(
         'from geometry_msgs.msg import Point\nfrom std_msgs.msg import String\n\n\n'

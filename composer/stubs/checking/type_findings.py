@@ -486,7 +486,12 @@ class TypeFindings:
         types = known[name.value]
         if payload is None or len(types) != 1 or not types[0]:
             return None
-        return self._payload(f'{types[0]}{part}', payload, given)
+        problem = self._payload(f'{types[0]}{part}', payload, given)
+        of_type = self.messages.get(self.types.get(id(payload), given))
+        meant = [each for each, several in known.items() if f'{several[0]}{part}' == of_type]
+        if problem and meant:
+            problem = *problem[:3], f"'{meant[0]}' is of this type"
+        return problem
 
     def _return(self, place: ReportedPlace) -> _Problem | None:
         use = self._use(place)
@@ -514,7 +519,10 @@ class TypeFindings:
         if self._may_fit(FieldType('message', full_name), given, is_stored=False):
             return None
         fields = ', '.join(field.name for field in description.fields)
-        advice = f'give its fields by name: {fields}' if fields else 'it has no fields: write {}'
+        named = f'give its fields by name: {fields}' if fields else 'it has no fields: write {}'
+        advice: str | None = named
+        if self._is_message(given):
+            advice = _field_of(description, self.messages[given])
         message = f'expected {in_python(full_name)}, got {self._shown(given)}'
         return value, 'field-type', message, _call_of(value, given) or advice
 
@@ -802,6 +810,12 @@ def _assigned(place: ReportedPlace) -> ast.expr | None:
     is_target = isinstance(getattr(place.values[0], 'ctx', None), ast.Store)
     assigned = (each.value for each in place.around if isinstance(each, ast.Assign))
     return next(assigned, None) if is_target else None
+
+
+def _field_of(description: MessageDescription, of_type: str) -> str | None:
+    """Return the help for a message that is one of the fields of the one that is meant."""
+    found = [each.name for each in description.fields if each.type.nested == of_type]
+    return f'give it by the name of its field: {found[0]}' if found else None
 
 
 def _keeps(array: FieldType) -> bool:
