@@ -17,9 +17,7 @@ from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
 from composer.node_uses.message_uses import advise_float, advise_text, explain_unknown
-from composer.node_uses.names import (
-    Chain,
-)
+from composer.node_uses.names import Chain, External
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import (
@@ -665,9 +663,11 @@ class TypeFindings:
         if match and match[4] == '__init__':
             value = [*place.values, *place.calls][0]
             return self._unknown_field(f'{match[1]}/{match[2]}/{match[3]}', keyword[1], value)
-        if not function[1].startswith(('composer_stubs.', 'composer.', 'rclpy.')):
+        method = function[1].removesuffix('.__init__').rpartition('.')[2]
+        is_known = function[1].startswith(('composer_stubs.', 'composer.', 'rclpy.'))
+        if not (is_known or method in self.own.classes):
             return None
-        method = function[1].removesuffix('.__init__').rpartition('.')[2].removeprefix('Rclpy')
+        method = method.removeprefix('Rclpy')
         return place.calls[0], 'bad-call', f"{method}() takes no argument '{keyword[1]}'", None
 
     def _missing(self, place: ReportedPlace) -> _Problem | None:
@@ -783,13 +783,15 @@ class TypeFindings:
         """Return a field or a parameter that is compared with a constant of another type."""
         types = _COMPARED.search(place.report.message)
         # It is at what is compared, or at the constant.
-        near = [*place.values, *place.around[:2]]
+        near = [*place.values, *place.around[:3]]
         found = [node for node in near if isinstance(node, ast.Compare)]
         if types is None or not found or len(found[0].ops) > 1:
             return None
         left, right = found[0].left, found[0].comparators[0]
         names = [_certain(types[1]), _certain(types[2])]
-        is_plain = isinstance(left, ast.Attribute | ast.Name) and isinstance(right, ast.Constant)
+        of_interface = self._origins.find(place, right)
+        is_constant = isinstance(right, ast.Constant) or isinstance(of_interface, External)
+        is_plain = isinstance(left, ast.Attribute | ast.Name) and is_constant
         with_state = isinstance(left, ast.Attribute)
         if not all(names) or not is_plain:
             return None
@@ -814,7 +816,11 @@ def _assigned(place: ReportedPlace) -> ast.expr | None:
 
 def _field_of(description: MessageDescription, of_type: str) -> str | None:
     """Return the help for a message that is one of the fields of the one that is meant."""
-    found = [each.name for each in description.fields if each.type.nested == of_type]
+    found = [
+        each.name
+        for each in description.fields
+        if each.type.nested == of_type and not each.type.array
+    ]
     return f'give it by the name of its field: {found[0]}' if found else None
 
 

@@ -80,8 +80,11 @@ class Walker:
         from diagnostic_msgs.msg import DiagnosticStatus as Status
 
         self.first = Leg()  # error
+        self.first = Leg(1.0, ended=True)  # error
         self.first.grow(2.0)  # error
         level = Status.OK if self.legs else Status.ERROR
+        if node.name == Status.OK:  # error
+            node.logger.info('ok')
         if level == 0:  # error
             steps = steps + 1  # noqa: F821  # error
             node.logger.info(f'{steps}')
