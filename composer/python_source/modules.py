@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import copy
 import inspect
+import re
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 # Longer lines of classes are not followed.
 MOST_BASES = 20
+_LINE_END = re.compile(r'\r\n?|\n')
 _STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
 _BINDING = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
@@ -319,7 +321,8 @@ def read_module(
         if before is not None and before.content == text and before.tokens <= most_tokens:
             return before
         tokens = count_tokens(text, path, most_tokens)
-        lines = tuple(text.decode(errors='replace').splitlines())
+        # A form feed ends no line.
+        lines = tuple(_LINE_END.split(text.decode(errors='replace').removesuffix('\n')))
         tree = parse_source(text, path)
     except UnreadableFileError as error:
         if error.is_too_large:

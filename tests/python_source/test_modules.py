@@ -322,3 +322,11 @@ def test_a_module_is_read_again_only_if_its_source_differs(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     here = project_search_path([tmp_path / 'system.yaml'])
     assert ModuleFinder(here, after).find('parts') is not same
+
+
+def test_a_form_feed_ends_no_line(tmp_path):
+    path = tmp_path / 'module.py'
+    path.write_bytes(b'a = 1\r\n\x0cb = 2\nc = 3\n')
+    module = read_module(path)
+    assert module.lines == ('a = 1', '\x0cb = 2', 'c = 3')
+    assert [each.lineno for each in module.body] == [1, 2, 3]

@@ -1,5 +1,6 @@
 """`composer check` finds by types what contradicts the declarations of a system, and nothing else."""
 
+import ast
 import shutil
 from pathlib import Path
 
@@ -9,8 +10,13 @@ from composer.checks.checker import check_system, create_context
 from composer.cli import main as cli
 from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
+from composer.python_source.modules import read_module
 from composer.stubs.checking import type_checker
+from composer.stubs.checking.annotated_copies import AnnotatedCopy
 from composer.stubs.checking.kept_types import TypesCheck
+from composer.stubs.checking.left_alone import ReportedPlace
+from composer.stubs.checking.type_checker import TypeReport
+from composer.stubs.project_modules import ProjectModule
 
 DATA = Path(__file__).resolve().parent.parent / 'data'
 TYPED = DATA / 'typed'
@@ -186,3 +192,21 @@ def test_a_line_says_what_was_not_checked_or_by_an_untested_version(typed, monke
     monkeypatch.setattr('composer.application.check.find_program', lambda: None)
     cli.run(['check', 'system.yaml'])
     assert 'not checked without pyrefly: the types of behaviours' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('path', sorted(TYPED.glob('*.py')), ids=lambda path: path.stem)
+def test_a_copy_that_reveals_all_types_is_valid(path):
+    source = read_module(path)
+    copy = AnnotatedCopy(
+        ProjectModule(path.stem, source, ast.Module([*source.body], []), ()), (), ()
+    )
+    report = TypeReport(path.name, 1, 1, 1, 1, 'bad-return', '')
+    asked = {}
+    for node in ast.walk(copy.module.tree):
+        if isinstance(node, ast.stmt):
+            line, column = copy.start(node)
+            place = ReportedPlace(copy, report._replace(line=line, column=column), {})
+            asked.update((id(part), part) for part in place.parts)
+    text = copy.revealing(asked.values()).text
+    ast.parse(text)
+    assert text.count('reveal_type(') == len(asked) > 0

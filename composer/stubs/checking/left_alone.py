@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # What asks what a value is.
 _TESTS = frozenset({'hasattr', 'isinstance', 'issubclass', 'callable', 'type'})
 # What has no places of its own, and what is no value that can be asked for.
-_NOT_ASKED = (ast.JoinedStr, ast.Lambda, ast.arguments)
+_NOT_ASKED = (ast.JoinedStr, ast.Lambda, ast.arguments, ast.pattern, ast.stmt)
 _NOT_VALUES = (
     *(ast.Constant, ast.Dict, ast.Lambda, ast.List, ast.NamedExpr, ast.Set, ast.Slice),
     *(ast.Starred, ast.Tuple, ast.Yield, ast.YieldFrom),
