@@ -308,6 +308,10 @@ class Names:
             return External(f'builtins.{name}') if is_builtin else self._starred(module, name)
         statement, is_conditional = statements[0]
         is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+        starred = [each for each, _ in top.statements.get('*', ())]
+        if any(each.lineno > statement.lineno for each in starred):  # type: ignore[attr-defined]
+            # It may bring another one.
+            return None
         if name in top.stored_again and not isinstance(statement, ast.Assign):
             return None
         if (len(statements) > 1 or is_conditional) and not is_import:
@@ -325,11 +329,13 @@ class Names:
     def _starred(self, module: ModuleSource, name: str) -> Value | None:
         """Return what a name stands for in a module from which all names are imported."""
         starred = [each for each, _ in module.top.statements.get('*', ())]
-        for statement in starred if name[:1] not in ('*', '_') else ():
+        own = self.name_of(module)
+        for statement in reversed(starred) if name[:1] not in ('*', '_') else ():
             if isinstance(statement, ast.ImportFrom):
-                own = self.name_of(module)
                 home = self.find_module(home_of(statement, own, is_package=module.is_package))
-                if home is not None and home is not module and name in home.top.statements:
+                if home is None or home is module or '__all__' in home.top.statements:
+                    return None
+                if name in home.top.statements:
                     return self.top_value(home, name)
         return None
 
@@ -414,10 +420,12 @@ class Names:
             value = members.assigned.get(name)
             if name in members.methods:
                 # A class may replace it: `get = classmethod(get)`.
-                method = members.methods[name]
-                return self._method(each, method, instance) if value is None else None
+                is_plain = value is None and not each.module.top.stored_attributes[name]
+                return self._method(each, members.methods[name], instance) if is_plain else None
             if value is not None and not self._is_stored(each.module, name):
-                return self.value_of(value, Scope(each.module))
+                known = self.value_of(value, Scope(each.module))
+                # A function is bound to the object by that.
+                return None if isinstance(known, Function) else known
             stored = members.stored.get(name, [])
             if stored and instance is not None:
                 method, kept = stored[0]
@@ -503,6 +511,10 @@ def find_stored(definition: ast.AST | None) -> dict[str, list[Stored]]:
         known = node if isinstance(node, (*FUNCTIONS, ast.Import, ast.ImportFrom)) else None
         for name in bound_names(node) if id(node) not in shown else ():
             found.setdefault(name, []).append((known, False))
+    # What a function in it stores has no one value.
+    inner = ast.walk(definition) if definition is not None else ()
+    for name in {each for node in inner if isinstance(node, ast.Nonlocal) for each in node.names}:
+        found[name] = [(None, False), *found.get(name, ())]
     return {name: several for name, several in found.items() if name not in shared}
 
 

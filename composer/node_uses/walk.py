@@ -37,6 +37,7 @@ from composer.node_uses.reading import (
 from composer.python_source.annotations import find_interface
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.syntax import (
+    is_none,
     list_arguments,
     list_children,
     list_nodes,
@@ -112,6 +113,7 @@ _CATCHING = frozenset(
 _SUPPRESSING = frozenset({'raises', 'suppress'})
 _CATCHING_ALL = frozenset({'BaseException', 'Exception'})
 _DOING_NOTHING = (ast.Pass, ast.Continue, ast.Return, ast.Break)
+_ACTING = (ast.Await, ast.Call, ast.NamedExpr, ast.Yield, ast.YieldFrom)
 _WITHOUT_EFFECT = (ast.Dict, ast.List, ast.Set, ast.Tuple, ast.Compare, ast.JoinedStr)
 # What raises RuntimeError where no loop of asyncio runs.
 _OF_LOOP = frozenset(
@@ -410,7 +412,9 @@ class Walk:
         """Walk through an expression whose value nothing takes."""
         run, module = self.run, scope.module
         self.visit(node, scope)
-        if isinstance(node, _WITHOUT_EFFECT):
+        if isinstance(node, _WITHOUT_EFFECT) and not any(
+            isinstance(each, _ACTING) for each in ast.walk(node)
+        ):
             run.report('no-effect', module, node, 'this has no effect', 'return it, or remove it')
         elif isinstance(node, ast.Attribute):
             match self._names.value_of(node, scope):
@@ -490,7 +494,11 @@ class Walk:
                 return not (isinstance(other, ast.Constant) or is_member)
             case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=args):
                 of = self._names.value_of(args[0], scope) if args else None
-                return name in _TESTS and of != Chain(('node', 'state'))
+                is_asked = isinstance(of, Chain) and of.path[0] in ('message', 'made')
+                called = self._names.value_of(node.func, scope) if is_asked else None
+                # A function of the project may ask that.
+                asks = isinstance(called, Function) and bool(words_in(called.definition) & _TESTS)
+                return asks or (name in _TESTS and of != Chain(('node', 'state')))
             case ast.Attribute(attr=name):
                 return name.startswith('__')
         return False
@@ -527,6 +535,13 @@ class Walk:
                     match self._names.value_of(node, scope):
                         case Chain(path=('node', 'parameters' | 'state' as of, name, *_)):
                             self._asked[key].add(f'{of}.{name}')
+            # What it calls may ask, too.
+            for node in list_nodes([scope.definition]):
+                called = (
+                    self._names.value_of(node.func, scope) if isinstance(node, ast.Call) else None
+                )
+                if isinstance(called, Function) and called.definition is not scope.definition:
+                    self._asked[key] |= _compared_with_none(called.definition)
         return self._asked[key]
 
     def need(self, node: ast.expr, scope: Scope) -> None:
@@ -825,7 +840,8 @@ class Walk:
             if value is not None:
                 self.need(value, scope)
             # The type of a message that the behaviour makes is the same in any system.
-            certain = bool(of_type) or not run.doubts
+            # In a function that is called, an argument may tell which type it is.
+            certain = not run.doubts or (bool(of_type) and not run.calls)
             use = MessageUse(path, node, scope.module, is_write, certain, of_type, value)
             run.reading.message_uses.append(use)
         for inner in ast.walk(node):
@@ -875,7 +891,8 @@ class Walk:
             case Class() as of:
                 instance = self._names.instance_of(of, call, scope)
                 init = self._names.attribute(instance, '__init__')
-                if isinstance(init, Function):
+                is_plain = not any(map(_is_made_otherwise, self._names.bases_of(of)))
+                if isinstance(init, Function) and is_plain:
                     self._follow(init, call, scope, is_waited=True)
                     return
             case External(name='time.sleep') if call.args:
@@ -1047,6 +1064,26 @@ def _prefix(node: ast.expr, name: str) -> ast.expr | None:
     """Return the part of a chain of attributes that ends with a name, if it is written there."""
     parts = (part for part in ast.walk(node) if isinstance(part, ast.Attribute))
     return next((part for part in parts if part.attr == name), None)
+
+
+def _is_made_otherwise(of: Class) -> bool:
+    """Return whether objects of a class may be made with other arguments than it says."""
+    enums = any(name.endswith(('Enum', 'Flag')) for name in words_in(*of.definition.bases))
+    return bool(of.definition.keywords or of.definition.decorator_list) or enums
+
+
+def _compared_with_none(definition: ast.AST) -> set[str]:
+    compared = (
+        each
+        for node in ast.walk(definition)
+        if isinstance(node, ast.Compare) and any(map(is_none, node.comparators))
+        for each in ast.walk(node)
+    )
+    return {
+        f'{each.value.attr}.{each.attr}'
+        for each in compared
+        if isinstance(each, ast.Attribute) and isinstance(each.value, ast.Attribute)
+    }
 
 
 def _tests_in(definition: ast.AST) -> list[ast.AST]:

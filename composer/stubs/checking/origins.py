@@ -58,6 +58,35 @@ class Origins(Names):
         """Return what a value stands for at the place of a report."""
         return self.value_of(value, self._scope(place))
 
+    def doubts(self, place: ReportedPlace, value: ast.expr) -> bool:
+        """Return whether other code may give another type to what is read here."""
+        return self._doubts(value, self._scope(place), 0)
+
+    def _doubts(self, node: ast.AST | None, scope: Scope, depth: int) -> bool:
+        match node:
+            case ast.Attribute(value=inner, attr=name) if not self.value_of(node, scope):
+                times = scope.module.top.stored_attributes[name]
+                is_known = name in self._kept or times <= 1
+                return not is_known or self._doubts(inner, scope, depth)
+            case ast.Name(id=name) if scope.definition is None or name not in scope.arguments:
+                stored = self.stored_in(scope.definition).get(name)
+                if stored is None and scope.outer is not None:
+                    return self._doubts(node, scope.outer, depth)
+                if stored is None:
+                    return name in scope.module.top.stored_again
+                is_known = self.value_of(node, scope) is not None
+                return depth < _DEEPEST and any(
+                    (is_item and not is_known)
+                    # What a function in it stores.
+                    or (each is None and len(stored) > 1)
+                    or self._doubts(each, scope, depth + 1)
+                    for each, is_item in stored
+                )
+            case ast.Subscript() if not self.value_of(node, scope):
+                # What is in a list of its own may be of any type.
+                return True
+        return False
+
     def knows(self, place: ReportedPlace, value: ast.expr, *, with_state: bool) -> bool:
         """Return whether a value is of known types, however the code came to the place.
 
@@ -90,7 +119,7 @@ class Origins(Names):
             case ast.Attribute(value=inner):
                 # What messages that are kept have.
                 return knows(inner)
-            case ast.NamedExpr() | ast.Yield() | ast.YieldFrom():
+            case ast.NamedExpr() | ast.Subscript() | ast.Yield() | ast.YieldFrom():
                 return False
             case ast.ListComp() | ast.SetComp() | ast.GeneratorExp():
                 return knows(node.elt, _inside(node, scope))
@@ -121,8 +150,10 @@ class Origins(Names):
         within: Scope | None = scope
         while within is not None and within.definition is not None:
             if stored := self.stored_in(within.definition).get(name):
-                known = (isinstance(each, ast.expr) and knows(each, within) for each, _ in stored)
-                return all(known)
+                return all(
+                    isinstance(each, ast.expr) and not is_item and knows(each, within)
+                    for each, is_item in stored
+                )
             if name in within.arguments:
                 arguments = list_arguments(within.definition.args)
                 written = [each.annotation for each in arguments if each.arg == name]
@@ -186,6 +217,12 @@ class Origins(Names):
         function = self.value_of(call.func, scope)
         if isinstance(function, Chain):
             return Chain((*function.path, '()'))
+        match function, call.args:
+            case External(name='builtins.list' | 'builtins.sorted' | 'builtins.tuple'), [items]:
+                items_of = self.value_of(items, scope)
+                return items_of if isinstance(items_of, Chain) else None
+            case External(name='builtins.max' | 'builtins.min'), [items]:
+                return self._item_of(self.value_of(items, scope))
         return super()._result_of(call, scope)
 
     def _item_of(self, owner: Value | None, _index: ast.expr | None = None) -> Value | None:

@@ -17,11 +17,12 @@ from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
 from composer.interfaces.message_types import in_python
 from composer.node_uses.message_uses import advise_float, advise_text, explain_unknown
-from composer.node_uses.names import Chain, External
+from composer.node_uses.names import Chain, Class, External, Instance
 from composer.node_uses.node_calls import OF_RCLPY
 from composer.node_uses.reading import SENDING_METHODS
 from composer.python_source.syntax import (
     owner_of,
+    stored_names,
     words_in,
 )
 from composer.records import record
@@ -106,6 +107,7 @@ _CONVERTING = {
     '__iter__',
     'to_msg',
 }
+_CONTAINERS = {'collections', 'defaultdict', 'deque', 'dict', 'list', 'set'}
 _COLLECTIONS = frozenset({'array', 'dict', 'frozenset', 'list', 'NDArray', 'set', 'tuple'})
 # Classes of Python, of which fields and parameters are.
 _PLAIN_OWNERS = _SCALARS | {'array', 'list', 'Mapping'}
@@ -168,14 +170,17 @@ class TypeFindings:
 
     def ask(self, copy: AnnotatedCopy, reports: Sequence[TypeReport]) -> list[ast.expr]:
         """Return the values whose types tell more of reports."""
-        places = (ReportedPlace(copy, each, self.context.behaviours.places) for each in reports)
-        asked = (
-            value
-            for place in places
-            if place.report.kind in self._readers and not place.is_left_alone
-            for value in place.parts
-        )
-        return [*{id(value): value for value in asked}.values()]
+        asked: dict[int, ast.expr] = {}
+        for report in reports:
+            place = ReportedPlace(copy, report, self.context.behaviours.places)
+            if report.kind not in self._readers or place.is_left_alone:
+                continue
+            for value in place.parts:
+                if self._origins.doubts(place, value):
+                    self.types[id(value)] = 'Any'
+                else:
+                    asked[id(value)] = value
+        return [*asked.values()]
 
     def learn(
         self, copy: AnnotatedCopy, asked: Sequence[ast.expr], reports: Sequence[TypeReport]
@@ -305,21 +310,22 @@ class TypeFindings:
         if owner == 'object' and isinstance(node.value, ast.Call):
             # Of `super()`: no base has it.
             classes = (each for each in place.around if isinstance(each, ast.ClassDef))
-            of = next(classes, None)
-            is_certain = (
-                of is not None and of.name in self.own.classes and of.name not in self.own.bases
-            )
+            of = getattr(next(classes, None), 'name', '')
+            is_certain = of in self.own.classes and of not in self.own.bases
             advice = 'remove it: the class inherits from nothing'
         elif owner in _PLAIN_OWNERS and not is_certain:
             is_certain = self._is_certain(place, node.value)
             advice = 'this is the value itself' if name == 'value' else advice
-        elif owner in self.own.classes and not is_certain:
-            is_certain = not {name, ''} & self.own.stored and self._is_certain(place, node.value)
+        elif owner in self.own.names and (of := self.own.classes.get(owner)):
+            is_certain |= self._is_certain(place, node.value)
             # Types of Python leave out private names, and the object may be of a class that
             # inherits from this one.
-            is_certain &= not (name.startswith('_') and self.own.classes[owner].bases)
-            is_own = place.function is not None and place.function in self.own.classes[owner].body
-            is_certain &= not (is_own and owner in self.own.bases)
+            is_open = bool({name, ''} & self.own.stored) or (name[0] == '_' and bool(of.bases))
+            made = self._origins.find(place, node.value)
+            is_own = place.function in of.body or not isinstance(made, Instance | Class)
+            is_certain &= not (is_open or (is_own and owner in self.own.bases))
+        elif owner in self.own.names and not of_interface:
+            is_certain = False
         elif of_interface and place.report.message.startswith('Class '):
             is_certain = True
             parts = _PARTS_OF_INTERFACES[of_interface[1]]
@@ -398,9 +404,11 @@ class TypeFindings:
     def _is_item(self, place: ReportedPlace, value: ast.expr, wanted: str, given: str) -> bool:
         """Return whether a list that something is appended to takes only other types."""
         func = place.calls[0].func if place.calls else value
-        is_of_message = isinstance(func, ast.Attribute) and self._is_certain(place, func.value)
-        is_wanted = self._is_message(wanted) or (is_of_message and wanted in _SCALARS)
-        return is_wanted and all(map(self._is_known, _alternatives(given)))
+        of = self._origins.find(place, func.value) if isinstance(func, ast.Attribute) else None
+        is_of_message = isinstance(of, Chain) and of.path[0] in ('message', 'made')
+        is_wanted = is_of_message and (self._is_message(wanted) or wanted in _SCALARS)
+        several = _alternatives(self.types.get(id(value), given))
+        return is_wanted and all(map(self._is_known, several))
 
     def _overload(self, place: ReportedPlace) -> _Problem | None:
         """Return a message that a function of Python is given, which takes none."""
@@ -444,7 +452,9 @@ class TypeFindings:
             return value, 'bad-call', f'{message}{self._shown(given)}', None
         # Functions of the same module have no module before their names.
         own = {name for _, name in self.functions}
-        if function in own or package in {each.partition('.')[0] for each in self.modules}:
+        packages = {each.partition('.')[0] for each in self.modules}
+        # A list of its own takes anything.
+        if function in own or package in packages | _CONTAINERS:
             return None
         if given in self.nodes or (self.messages.get(given) and given not in self.own.names):
             what = 'a node' if given in self.nodes else self._shown(given)
@@ -469,9 +479,9 @@ class TypeFindings:
         noun = SENDING_METHODS[method]
         known = dict(getattr(self.shapes[owner], section))
         if not isinstance(name, ast.Constant):
-            given = self.types.get(id(name), given)
+            of_name = self.types.get(id(name), given)
             is_swapped = isinstance(payload, ast.Constant) and payload.value in known
-            if not (self._is_message(given) or (is_swapped and given in _SCALARS - {'str'})):
+            if not (self._is_message(of_name) or (is_swapped and given in _SCALARS - {'str'})):
                 return None
             message = f'{method}(name, payload) takes the name first, got {self._shown(given)}'
             advice = 'swap the arguments' if is_swapped else suggest('', known, 'it declares')
@@ -683,6 +693,10 @@ class TypeFindings:
         found = _UNBOUND.match(place.report.message)
         if found is None or not place.values:
             return None
+        # The last round of a loop may have given it one.
+        again = (each for each in place.around if isinstance(each, ast.For | ast.While))
+        if any(found[1] in stored_names(each) for each in again):
+            return None
         return place.values[0], 'undefined-name', f"'{found[1]}' has no value here yet", None
 
     def _count(self, place: ReportedPlace) -> _Problem | None:
@@ -747,6 +761,8 @@ class TypeFindings:
                 advice = f'write .{key.value}'
             return values[0], 'bad-call', f'{self._shown(owner)} has no items', advice
         if owner in ('array', 'list') and isinstance(key, ast.Constant):
+            if isinstance(key.value, int):
+                return None
             message = f'an array has items by number, not by {type(key.value).__name__}'
             return key, 'bad-call', message, None
         message = f"'{owner}' has no items"

@@ -145,7 +145,7 @@ def _read_own_code(modules: Mapping[str, ProjectModule], kept: Collection[str]) 
     Args:
         kept: The attributes that are of one type by all that is stored there.
     """
-    names, stored, annotated = set[str](), Counter[str](), set[str]()
+    names, stored, annotated, rebound = set[str](), Counter[str](), set[str](), set[str]()
     classes: list[ast.ClassDef] = []
     for module in modules.values():
         imports = module.source.imports.items()
@@ -162,8 +162,13 @@ def _read_own_code(modules: Mapping[str, ProjectModule], kept: Collection[str]) 
                     names.add(owner)
                 case ast.AnnAssign(target=ast.Attribute(attr=name), annotation=annotation):
                     annotated |= {name} if len(words_in(annotation)) == 1 else set()
+        # What has another value as well is none of them.
+        again = module.source.top.statements.items()
+        rebound |= {name for name, several in again if len(several) > 1}
     written = Counter(each.name for each in classes)
+    holders = Counter(name for each in classes for name in _attributes_of(each))
     marks = {each.name: _words_of_decorators(each) for each in classes}
+    odd = {each.name for each in classes if each.keywords or marks[each.name] - _PLAIN_DECORATORS}
     return OwnCode(
         names=frozenset(names | written.keys()),
         stored=frozenset(+stored),
@@ -171,12 +176,20 @@ def _read_own_code(modules: Mapping[str, ProjectModule], kept: Collection[str]) 
             each.name: each
             for each in classes
             if written[each.name] == 1
+            and each.name not in rebound
             and marks[each.name] <= _PLAIN_DECORATORS
             and not each.keywords
+            and not words_in(*each.bases) & odd
         },
         bases=frozenset(base for each in classes for base in words_in(*each.bases)),
-        kept=frozenset(annotated.union(kept)),
+        kept=frozenset({name for name in annotated if holders[name] == 1}.union(kept)),
     )
+
+
+def _attributes_of(of: ast.ClassDef) -> set[str]:
+    nodes = ast.walk(of)
+    stored = (each for each in nodes if isinstance(each, ast.Attribute))
+    return {each.attr for each in stored if isinstance(each.ctx, ast.Store)}
 
 
 def _words_of_decorators(of: ast.ClassDef) -> set[str]:
