@@ -420,7 +420,7 @@ class Names:
             value = members.assigned.get(name)
             if name in members.methods:
                 # A class may replace it: `get = classmethod(get)`.
-                is_plain = value is None and not each.module.top.stored_attributes[name]
+                is_plain = value is None and name not in members.stored
                 return self._method(each, members.methods[name], instance) if is_plain else None
             if value is not None and not self._is_stored(each.module, name):
                 known = self.value_of(value, Scope(each.module))
