@@ -165,7 +165,7 @@ _ARRAY_INTEGERS = frozenset(INTEGER_RANGES) - {'byte'}
 
 _KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 # The parts of services and actions that behaviours name; of the other ones, nothing is said.
-_PARTS = {'srv': ('Request', 'Response'), 'action': ('Goal', 'Result', 'Feedback')}
+PARTS_OF_KINDS = {'srv': ('Request', 'Response'), 'action': ('Goal', 'Result', 'Feedback')}
 _OTHERS = {'srv': 'Event', 'action': 'Impl'}
 
 
@@ -229,10 +229,10 @@ def _write_interface(
     for message in interface.parts:
         yield from _write_message(message, imports)
     _, kind, last = name.split('/')
-    if kind in _PARTS:
+    if kind in PARTS_OF_KINDS:
         alias, anything = imports.take('typing', 'TypeAlias'), imports.take('typing', 'Any')
         yield from ('', f'class {last}:')
-        yield from (f'    {part}: {alias} = {last}_{part}' for part in _PARTS[kind])
+        yield from (f'    {part}: {alias} = {last}_{part}' for part in PARTS_OF_KINDS[kind])
         yield f'    {_OTHERS[kind]}: {anything}'
 
 

@@ -15,7 +15,7 @@ from composer.diagnostics import Span, diagnostic_at
 from composer.interfaces.descriptions import FieldType
 from composer.interfaces.field_errors import unknown_field
 from composer.interfaces.field_values import INTEGER_RANGES, OCTET_KINDS
-from composer.interfaces.message_types import in_python
+from composer.interfaces.message_types import PARTS, in_python
 from composer.node_uses.message_uses import advise_float, advise_text, explain_unknown
 from composer.node_uses.names import Chain, Class, External, Instance
 from composer.node_uses.node_calls import OF_RCLPY
@@ -29,6 +29,7 @@ from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
 from composer.stubs.checking.left_alone import ReportedPlace
 from composer.stubs.checking.origins import INTERFACE, OF_PYTHON, Origins
+from composer.stubs.message_stubs import PARTS_OF_KINDS
 from composer.stubs.node_stubs import SENDING
 
 if TYPE_CHECKING:
@@ -68,11 +69,6 @@ _OVERLOADED = re.compile(r'No matching overload found for function `([\w.]+)`')
 _UNARY = re.compile(r'Type `([^`]+)` is not iterable')
 _COMPARED = re.compile(r'between incompatible types `([^`]+)` and `([^`]+)`')
 _INDEXED = re.compile(r'Cannot (?:index into|set item in) `(\w+)[^`]*`')
-_PARTS_OF_INTERFACES = {
-    'msg': (),
-    'srv': ('Request', 'Response', 'Event'),
-    'action': ('Goal', 'Result', 'Feedback'),
-}
 _PARTS = {
     'Logger': 'the logger',
     'Goal': 'a goal',
@@ -293,7 +289,10 @@ class TypeFindings:
         if owner in self.messages and not is_part:
             full_name = self.messages[owner]
             return self._unknown_field(full_name, name, node) if full_name else None
-        rule, message = 'unknown-attribute', f"{_PARTS.get(owner)} has no attribute '{name}'"
+        rule, message = (
+            'unknown-attribute',
+            f"{_PARTS_OF_KINDS.get(owner)} has no attribute '{name}'",
+        )
         if owner == 'Coroutine':
             rule, advice = 'missing-await', 'put await before the call'
             message = f"'{name}' is read of a coroutine, which has not been awaited"
@@ -328,7 +327,7 @@ class TypeFindings:
             is_certain = False
         elif of_interface and place.report.message.startswith('Class '):
             is_certain = True
-            parts = _PARTS_OF_INTERFACES[of_interface[1]]
+            parts = PARTS_OF_KINDS.get(of_interface[1], ())
             advice = did_you_mean(find_nearest(name, parts), f'it has {", ".join(parts)}')
         if owner == 'Mapping' and is_certain:
             owner = ast.unparse(node.value)
@@ -340,7 +339,7 @@ class TypeFindings:
 
     def _place_of_constant(self, owner: str, name: str) -> str | None:
         """Return the help for a constant that a part of a service or an action has."""
-        for part in ('Goal', 'Result', 'Feedback', 'Request', 'Response'):
+        for part in PARTS:
             if name in self.context.types.constants(self.messages.get(f'{owner}_{part}', '')):
                 return f'write {owner}.{part}.{name}'
         return None
@@ -657,7 +656,7 @@ class TypeFindings:
 
     def _shown(self, given: str) -> str:
         names = [
-            in_python(self.messages.get(each, '')) or _PARTS.get(each, each)
+            in_python(self.messages.get(each, '')) or _PARTS_OF_KINDS.get(each, each)
             for each in _without_none(given)
         ]
         return 'a function' if _is_function(given) else ' | '.join(dict.fromkeys(names))
