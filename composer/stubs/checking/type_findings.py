@@ -289,10 +289,7 @@ class TypeFindings:
         if owner in self.messages and not is_part:
             full_name = self.messages[owner]
             return self._unknown_field(full_name, name, node) if full_name else None
-        rule, message = (
-            'unknown-attribute',
-            f"{_PARTS_OF_KINDS.get(owner)} has no attribute '{name}'",
-        )
+        rule, message = 'unknown-attribute', f"{_PARTS.get(owner)} has no attribute '{name}'"
         if owner == 'Coroutine':
             rule, advice = 'missing-await', 'put await before the call'
             message = f"'{name}' is read of a coroutine, which has not been awaited"
@@ -656,7 +653,7 @@ class TypeFindings:
 
     def _shown(self, given: str) -> str:
         names = [
-            in_python(self.messages.get(each, '')) or _PARTS_OF_KINDS.get(each, each)
+            in_python(self.messages.get(each, '')) or _PARTS.get(each, each)
             for each in _without_none(given)
         ]
         return 'a function' if _is_function(given) else ' | '.join(dict.fromkeys(names))
