@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from composer.python_source.syntax import FunctionNode
 
-# What was tested on a way; `None` if there is no way.
-_Tested = frozenset[str] | None
 # Expressions whose value is never `None`.
 _VALUES = (
     *(ast.BinOp, ast.Compare, ast.Dict, ast.DictComp, ast.JoinedStr, ast.List, ast.ListComp),
@@ -46,7 +44,8 @@ def always_answers(function: FunctionNode) -> bool:
     sure = set() if message in stored_names(function) else {message}
     if any(isinstance(node, ast.Raise | ast.Continue) for node in ast.walk(function)):
         return False
-    return _ends(function) and all(_is_value(each.value, sure) for each in _returns(function))
+    has_end = _Ways(function).lead_past(function.body)
+    return not has_end and all(_is_value(each.value, sure) for each in _returns(function))
 
 
 def _message_of(function: FunctionNode) -> str:
@@ -79,32 +78,26 @@ def ends_without_value(
     Args:
         is_last: Whether a call never returns; others have the names of such functions.
     """
-    has_value = any(not is_none(answer.value) for answer in _returns(function))
-    ways = _Ways(function, is_last, is_certain=has_value)
-    is_end = ways.follow(function.body, frozenset()) is not None
-    return [*ways.bare, *([function] if is_end else [])]
+    is_certain = any(not is_none(answer.value) for answer in _returns(function))
+    ways = _Ways(function, is_last, is_certain=is_certain)
+    has_end = ways.lead_past(function.body)
+    return [*ways.bare, *([function] if has_end else [])]
 
 
 def never_returns(function: FunctionNode) -> bool:
     """Return whether a function always raises, or is said to."""
-    said = dotted_name(function.returns) if function.returns is not None else ''
-    if str(said).rpartition('.')[2] in ('NoReturn', 'Never'):
+    if dotted_name(function.returns).rpartition('.')[2] in ('NoReturn', 'Never'):
         return True
-    return not any(_returns(function)) and _ends(function)
-
-
-def _ends(function: FunctionNode) -> bool:
-    """Return whether no way through a function comes to its end: all return or raise."""
-    return _Ways(function, is_certain=False).follow(function.body, frozenset()) is None
+    return not any(_returns(function)) and not _Ways(function).lead_past(function.body)
 
 
 class _Ways:
-    """The ways through a function, each with what was tested on it.
+    """The ways through a function.
 
     Two tests of one thing may leave no way past both: `if x: return 1` and `elif not x: return 2`.
 
     Args:
-        is_certain: Whether to follow only ways that are there for certain, not all there may be.
+        is_certain: Whether only ways count that are there for certain, not all there may be.
 
     Attributes:
         bare: The `return` without a value that some way comes to.
@@ -115,14 +108,15 @@ class _Ways:
         function: FunctionNode,
         is_last: Callable[[ast.Call], bool] = lambda _: False,
         *,
-        is_certain: bool,
+        is_certain: bool = False,
     ) -> None:
         self.bare: list[ast.expr | ast.Return] = []
         self._message = _message_of(function)
         self._is_last = is_last
         self._is_certain = is_certain
-        self._continued: list[_Tested] = []
-        self._broken: list[_Tested] = []
+        self._tested: set[str] = set()
+        # How the loop around a statement is left.
+        self._jumps: set[type[ast.stmt]] = set()
         self._sources: dict[str, set[str]] = {}
         for node in ast.walk(function) if is_certain else ():
             if isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) and node.value:
@@ -130,93 +124,84 @@ class _Ways:
                 for name in stored_names(node):
                     self._sources.setdefault(name, set()).update(subjects)
 
-    def follow(self, block: list[ast.stmt], tested: _Tested) -> _Tested:
-        """Return what was tested on the way to the end of a block; `None` if there is no way."""
-        for statement in block:
-            if tested is None:
-                break
-            tested = self._past(statement, tested)
-        return tested
+    def lead_past(self, block: list[ast.stmt]) -> bool:
+        """Return whether a way comes to the end of a block."""
+        return all(self._is_past(statement) for statement in block)
 
-    def _past(self, statement: ast.stmt, tested: frozenset[str]) -> _Tested:
+    def _is_past(self, statement: ast.stmt) -> bool:
         match statement:
             case ast.Return():
                 self.bare += [statement.value or statement] if is_none(statement.value) else []
             case ast.Break() | ast.Continue():
-                is_break = isinstance(statement, ast.Break)
-                (self._broken if is_break else self._continued).append(tested)
+                self._jumps.add(type(statement))
             case ast.Raise() | ast.Assert(test=ast.Constant(value=False | 0)):
                 pass
             case ast.Expr(value=(ast.Call() as call) | ast.Await(value=ast.Call() as call)):
-                is_exit = _last_name(call.func) in _EXITS
-                return None if is_exit or self._is_last(call) else tested
+                return _last_name(call.func) not in _EXITS and not self._is_last(call)
             case ast.If():
-                return self._past_if(statement, tested)
+                return self._is_past_if(statement)
             case ast.With() | ast.AsyncWith():
                 is_left = any('suppress' in ast.dump(item) for item in statement.items)
-                return _join(self.follow(statement.body, tested), tested if is_left else None)
+                return self.lead_past(statement.body) or is_left
             case ast.For() | ast.AsyncFor() | ast.While():
-                return self._past_loop(statement, tested)
+                return self._is_past_loop(statement)
             case ast.Match():
-                return self._past_match(statement, tested)
+                return self._is_past_match(statement)
             case ast.Try() | ast.TryStar():
-                return self._past_try(statement, tested)
+                handlers = [each.body for each in statement.handlers if not self._is_rare(each)]
+                blocks = ([*statement.body, *statement.orelse], *handlers)
+                past = [self.lead_past(block) for block in blocks]
+                return self.lead_past(statement.finalbody) and any(past)
             case _:
-                return tested
-        return None
+                return True
+        return False
 
-    def _past_if(self, node: ast.If, tested: frozenset[str]) -> _Tested:
-        within = tested | self._subjects(node.test)
-        body = self.follow(node.body, within)
-        other = self.follow(node.orelse, within if self._may_fail(node.test, tested) else None)
-        # Where both branches come here, nothing is known of the test.
-        return tested if body == other == within else _join(body, other)
+    def _is_past_if(self, node: ast.If) -> bool:
+        may_fail, before = self._may_fail(node.test), self._tested
+        within = self._tested = before | self._subjects(node.test)
+        body = self.lead_past(node.body)
+        other = may_fail and self.lead_past(node.orelse)
+        if body and other and self._tested == within:
+            # Where both branches come here, nothing is known of the test.
+            self._tested = before
+        return body or other
 
-    def _past_match(self, node: ast.Match, tested: frozenset[str]) -> _Tested:
-        within = tested | self._subjects(node.subject)
-        ends = [self.follow(case.body, within) for case in node.cases]
+    def _is_past_match(self, node: ast.Match) -> bool:
+        self._tested = self._tested | self._subjects(node.subject)
+        past = [self.lead_past(case.body) for case in node.cases]
         texts = [getattr(case.pattern, 'value', None) for case in node.cases]
-        is_past = all(self._is_one_text(node.subject, text) for text in texts)
         match node.cases[-1]:
             case ast.match_case(ast.MatchAs(None) | ast.MatchOr([*_, ast.MatchAs(None)]), None):
-                return _join(*ends)
-        return _join(*ends, within if is_past or not self._is_certain else None)
+                return any(past)
+        is_open = all(self._is_one_text(node.subject, text) for text in texts)
+        return any(past) or is_open or not self._is_certain
 
-    def _past_try(self, node: ast.Try | ast.TryStar, tested: frozenset[str]) -> _Tested:
-        ends = [self.follow(node.orelse, self.follow(node.body, tested))]
-        for handler in node.handlers:
-            caught = ast.dump(handler.type) if handler.type else ''
-            is_rare = self._is_certain and any(name in caught for name in _AT_THE_END)
-            ends.append(self.follow(handler.body, None if is_rare else tested))
-        is_left = self.follow(node.finalbody, tested) is not None
-        return _join(*ends) if is_left else None
+    def _is_rare(self, handler: ast.ExceptHandler) -> bool:
+        caught = ast.dump(handler.type) if handler.type else ''
+        return self._is_certain and any(name in caught for name in _AT_THE_END)
 
-    def _past_loop(
-        self, node: ast.For | ast.AsyncFor | ast.While, tested: frozenset[str]
-    ) -> _Tested:
+    def _is_past_loop(self, node: ast.For | ast.AsyncFor | ast.While) -> bool:
         source = node.test if isinstance(node, ast.While) else node.iter
-        before = self._continued, self._broken
-        self._continued, self._broken = [], []
+        before, jumps = self._tested, self._jumps
         # Which round is the last may be tested by what the loop stores.
-        stored = stored_names(node)
-        body = self.follow(node.body, tested | self._subjects(source) | stored)
-        body, broken = _join(body, *self._continued), self._broken
-        self._continued, self._broken = before
-        past = None if _is_endless(node) else tested
-        if self._is_certain and past is not None:
-            past = self._past_source(source, tested, body)
-        return _join(self.follow(node.orelse, past), *broken)
+        self._tested = before | self._subjects(source) | stored_names(node)
+        self._jumps = set()
+        is_past = self.lead_past(node.body) or ast.Continue in self._jumps
+        is_broken, self._jumps = ast.Break in self._jumps, jumps
+        called = {_last_name(each.func) for each in ast.walk(source) if isinstance(each, ast.Call)}
+        if not self._is_certain:
+            is_past = True
+        elif not called <= _FINITE:
+            is_past = False
+        elif self._is_given(source) or 'open' in called:
+            # It may have no round.
+            is_past, self._tested = True, before
+        elif dotted_name(source) in self._sources:
+            is_past = False
+        is_over = is_past and not _is_endless(node)
+        return (is_over and self.lead_past(node.orelse)) or is_broken
 
-    def _past_source(self, source: ast.expr, tested: frozenset[str], body: _Tested) -> _Tested:
-        """Return what was tested where a loop is certain to end: without a round, or after one."""
-        calls = [node.func for node in ast.walk(source) if isinstance(node, ast.Call)]
-        names = {_last_name(call) for call in calls}
-        if not names <= _FINITE:
-            return None
-        is_maybe_empty = self._is_given(source) or 'open' in names
-        return tested if is_maybe_empty else None if dotted_name(source) in self._sources else body
-
-    def _may_fail(self, test: ast.expr, tested: frozenset[str]) -> bool:
+    def _may_fail(self, test: ast.expr) -> bool:
         """Return whether a test may be false, whatever was tested before."""
         parts: list[ast.expr] = []
         match test:
@@ -230,8 +215,7 @@ class _Ways:
             return True
         # It may name all that there are.
         subjects = [subject for part in parts for subject in self._subjects(part)]
-        is_double = len(subjects) > len(set(subjects)) and not _are_of_several(parts)
-        is_whole = is_double or any(
+        is_whole = len(subjects) > len(set(subjects)) or any(
             (isinstance(node, ast.Call) and _last_name(node.func) in _TESTS_OF_TYPES)
             or (
                 isinstance(node, ast.Compare)
@@ -240,7 +224,7 @@ class _Ways:
             )
             for node in ast.walk(test)
         )
-        return not is_whole and not self._is_tested(test, tested)
+        return not is_whole and not self._is_tested(test)
 
     def _is_one_text(self, tested: ast.expr, text: object) -> bool:
         """Return whether something in the message is tested for a text: it may be another."""
@@ -252,12 +236,12 @@ class _Ways:
         subjects = self._subjects(expression)
         return any(subject.startswith(f'{self._message}.') for subject in subjects)
 
-    def _is_tested(self, expression: ast.expr, tested: frozenset[str]) -> bool:
+    def _is_tested(self, expression: ast.expr) -> bool:
         """Return whether something of an expression, or that it is a part of, was tested."""
         return any(
             f'{one}.'.startswith(f'{two}.') or two.startswith(f'{one}.')
             for one in self._subjects(expression)
-            for two in tested
+            for two in self._tested
         )
 
     def _subjects(self, expression: ast.expr) -> set[str]:
@@ -282,14 +266,6 @@ class _Ways:
         return subjects
 
 
-def _are_of_several(tests: list[ast.expr]) -> bool:
-    """Return whether tests are of several names that one call may give: `a > 2 or b > 2`."""
-    compared = [each for each in tests if isinstance(each, ast.Compare)]
-    names = {each.left.id for each in compared if isinstance(each.left, ast.Name)}
-    ways = {type(each.ops[0]) for each in compared}
-    return len(names) == len(tests) and len(ways) == 1 and ways <= {ast.Gt, ast.Lt}
-
-
 def _is_endless(loop: ast.For | ast.AsyncFor | ast.While) -> bool:
     """Return whether only its body ends a loop."""
     if isinstance(loop, ast.While):
@@ -299,9 +275,3 @@ def _is_endless(loop: ast.For | ast.AsyncFor | ast.While) -> bool:
 
 def _last_name(called: ast.expr) -> str:
     return dotted_name(called).rpartition('.')[2] or getattr(called, 'attr', '?')
-
-
-def _join(*ends: _Tested) -> _Tested:
-    """Return what was tested on any of several ways; `None` if there is no way."""
-    ways = [end for end in ends if end is not None]
-    return frozenset().union(*ways) if ways else None

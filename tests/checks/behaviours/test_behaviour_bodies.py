@@ -310,7 +310,6 @@ UNANSWERED = {
     f'if request.data: return None\n    {GIVES}': 2,
     f'with open("x") as file:\n        if file: {GIVES}': 1,
     f'for _ in range(3):\n        try: {GIVES}\n        except OSError: print()': 1,
-    f'a, b = divmod(request.data, 5)\n    if a > 2 or b > 2: {GIVES}': 1,
 }
 ANSWERED = (
     f'if request.data: {GIVES}\n    raise ValueError',
