@@ -12,23 +12,18 @@ from composer.node_uses.names import (
     Chain,
     Class,
     External,
-    Function,
     Instance,
     Names,
     Scope,
     find_stored,
 )
 from composer.python_source.syntax import (
-    list_arguments,
-    list_children,
-    own_nodes,
     positional_names,
     stored_names,
-    words_in,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from composer.node_uses.names import Value
     from composer.python_source.module_finder import ModuleFinder
@@ -63,103 +58,37 @@ class Origins(Names):
         return self._doubts(value, self._scope(place), 0)
 
     def _doubts(self, node: ast.AST | None, scope: Scope, depth: int) -> bool:
+        if depth > _DEEPEST or not isinstance(node, ast.expr):
+            return False
+        match self.value_of(node, scope):
+            case External(name=name):
+                return not (INTERFACE.search(name) or name.split('.')[0] in OF_PYTHON)
+            case None:
+                return self._doubts_unknown(node, scope, depth)
+        return isinstance(node, ast.Name) and self._doubts_unknown(node, scope, depth)
+
+    def _doubts_unknown(self, node: ast.expr, scope: Scope, depth: int) -> bool:
+        is_known = self.value_of(node, scope) is not None
         match node:
-            case ast.Attribute(value=inner, attr=name) if not self.value_of(node, scope):
+            case ast.Attribute(value=inner, attr=name):
                 times = scope.module.top.stored_attributes[name]
-                is_known = name in self._kept or times <= 1
-                return not is_known or self._doubts(inner, scope, depth)
+                is_kept = name in self._kept or times <= (not isinstance(inner, ast.Name))
+                return not is_kept or self._doubts(inner, scope, depth)
             case ast.Name(id=name) if scope.definition is None or name not in scope.arguments:
                 stored = self.stored_in(scope.definition).get(name)
                 if stored is None and scope.outer is not None:
                     return self._doubts(node, scope.outer, depth)
                 if stored is None:
-                    return name in scope.module.top.stored_again
-                is_known = self.value_of(node, scope) is not None
-                return depth < _DEEPEST and any(
+                    return name in scope.module.top.stored_again or not is_known
+                return any(
                     (is_item and not is_known)
                     # What a function in it stores.
                     or (each is None and len(stored) > 1)
                     or self._doubts(each, scope, depth + 1)
                     for each, is_item in stored
                 )
-            case ast.Subscript() if not self.value_of(node, scope):
-                # What is in a list of its own may be of any type.
-                return True
-        return False
-
-    def knows(self, place: ReportedPlace, value: ast.expr, *, with_state: bool) -> bool:
-        """Return whether a value is of known types, however the code came to the place.
-
-        Args:
-            with_state: Whether those of the state count, although what it holds may change.
-        """
-        return self._knows(value, self._scope(place), with_state, 0)
-
-    def _knows(self, node: ast.expr, scope: Scope, with_state: bool, depth: int) -> bool:  # noqa: C901, FBT001, PLR0911
-        def knows(each: ast.expr, within: Scope = scope) -> bool:
-            return depth < _DEEPEST and self._knows(each, within, with_state, depth + 1)
-
-        match self.value_of(node, scope):
-            case Chain(path=(_, 'state' | 'own_state', *_)):
-                # What was in the state once may be something else now.
-                return with_state and not isinstance(node, ast.Name)
-            case External(name=name):
-                return bool(INTERFACE.search(name)) or name.split('.')[0] in OF_PYTHON
-            case None:
-                pass
-            case _:
-                return True
-        match node:
-            case ast.Name(id=name):
-                return self._knows_name(name, scope, depth)
-            case ast.Call():
-                return self._knows_call(node, scope, knows)
-            case ast.Attribute(value=ast.Name(), attr=name):
-                return name in self._kept
-            case ast.Attribute(value=inner):
-                # What messages that are kept have.
-                return knows(inner)
-            case ast.NamedExpr() | ast.Subscript() | ast.Yield() | ast.YieldFrom():
-                return False
-            case ast.ListComp() | ast.SetComp() | ast.GeneratorExp():
-                return knows(node.elt, _inside(node, scope))
-            case ast.IfExp(body=body, orelse=other):
-                return knows(body) and knows(other)
-        parts = [each for each in list_children(node) if isinstance(each, ast.expr)]
-        return not isinstance(node, ast.DictComp) and all(map(knows, parts))
-
-    def _knows_call(
-        self, call: ast.Call, scope: Scope, knows: Callable[[ast.expr, Scope], bool]
-    ) -> bool:
-        called, func = self.value_of(call.func, scope), call.func
-        if not isinstance(called, Function):
-            # The method of a value returns what its type says.
-            is_method = called is None and isinstance(func, ast.Attribute)
-            of = func.value if is_method and isinstance(func, ast.Attribute) else func
-            return all(knows(each, scope) for each in (of, *call.args))
-        given = {name: each for name, each in self.bind(called, call, scope).items() if each}
-        within = Scope(called.module, called.definition, given, called.scope)
-        nodes = own_nodes(called.definition)
-        returned = [each.value for each in nodes if isinstance(each, ast.Return)]
-        return all(each is None or knows(each, within) for each in returned)
-
-    def _knows_name(self, name: str, scope: Scope, depth: int) -> bool:
-        def knows(each: ast.expr, within: Scope) -> bool:
-            return depth < _DEEPEST and self._knows(each, within, False, depth + 1)
-
-        within: Scope | None = scope
-        while within is not None and within.definition is not None:
-            if stored := self.stored_in(within.definition).get(name):
-                return all(
-                    isinstance(each, ast.expr) and not is_item and knows(each, within)
-                    for each, is_item in stored
-                )
-            if name in within.arguments:
-                arguments = list_arguments(within.definition.args)
-                written = [each.annotation for each in arguments if each.arg == name]
-                return len(words_in(*written) - {'None', 'Optional'}) == 1
-            within = within.outer
-        return False
+        # What is in a list of its own may be of any type.
+        return isinstance(node, ast.Subscript)
 
     def _scope(self, place: ReportedPlace) -> Scope:
         """Return what the names mean at the place of a report."""

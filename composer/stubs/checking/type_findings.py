@@ -280,7 +280,7 @@ class TypeFindings:
             is_part or owner in self.messages or of_node in self.nodes
         ):
             return self._attribute_elsewhere(place, owner, node, meant[1] if meant else '')
-        if not self._is_certain(place, node.value, with_state=True):
+        if not self._is_certain(place, node.value):
             return None
         if of_node in self.nodes:
             # The walk of behaviours finds other names that nodes do not have.
@@ -357,14 +357,12 @@ class TypeFindings:
         problem = explain_unknown(self.context.types, description, name)
         return (node, 'unknown-field', *problem) if problem else None
 
-    def _is_certain(
-        self, place: ReportedPlace, value: ast.expr, *, with_state: bool = False
-    ) -> bool:
+    def _is_certain(self, place: ReportedPlace, value: ast.expr) -> bool:
         """Return whether a value has one type, beside `None`, however the code came there."""
         # What is calculated with an unset value is unknown.
         types = {*_alternatives(self.types.get(id(value), ''))} - {'None', 'Unknown'}
         is_open = len(types) > 1 or 'Any' in types
-        return not is_open and self._origins.knows(place, value, with_state=with_state)
+        return not (is_open or self._origins.doubts(place, value))
 
     # Arguments
 
@@ -414,7 +412,7 @@ class TypeFindings:
         for call in place.calls[:1]:
             for value in call.args:
                 given = self.types.get(id(value), '')
-                if self._is_message(given) and self._is_certain(place, value, with_state=True):
+                if self._is_message(given) and self._is_certain(place, value):
                     message = f'{function[1]}() does not take {self._shown(given)}'
                     return value, 'bad-call', message, None
         return None
@@ -454,7 +452,7 @@ class TypeFindings:
             return None
         if given in self.nodes or (self.messages.get(given) and given not in self.own.names):
             what = 'a node' if given in self.nodes else self._shown(given)
-            is_certain = self._is_certain(place, value, with_state=True)
+            is_certain = self._is_certain(place, value)
         else:
             what = self._shown(given)
             is_certain &= names is not None and package in OF_PYTHON
@@ -724,12 +722,11 @@ class TypeFindings:
             return None
         parts = [node for node in ast.iter_child_nodes(values[0]) if isinstance(node, ast.expr)]
         parts = [part for part in parts if not isinstance(part, ast.Constant | ast.List)]
-        with_state = bool({*given} & known)
         if len(parts) == len(given):
             # No message goes with anything else.
             both = zip(parts, given, strict=True)
             parts = [part for part, each in both if self._is_message(each)] or parts
-        if not all(self._is_certain(place, part, with_state=with_state) for part in parts):
+        if not all(self._is_certain(place, part) for part in parts):
             return None
         left, right = map(self._shown, given)
         message = f"'{match[1]}' is not possible between {left} and {right}"
@@ -772,7 +769,7 @@ class TypeFindings:
         for node in place.around:
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
                 values = [node.value]
-        if given is None or not values or not self._is_certain(place, values[0], with_state=True):
+        if given is None or not values or not self._is_certain(place, values[0]):
             return None
         if given[1] not in {'bool', 'float', 'int'} and not self._is_message(given[1]):
             return None
@@ -804,10 +801,9 @@ class TypeFindings:
         of_interface = self._origins.find(place, right)
         is_constant = isinstance(right, ast.Constant) or isinstance(of_interface, External)
         is_plain = isinstance(left, ast.Attribute | ast.Name) and is_constant
-        with_state = isinstance(left, ast.Attribute)
         if not all(names) or not is_plain:
             return None
-        if not self._is_certain(place, left, with_state=with_state):
+        if not self._is_certain(place, left):
             return None
         shown = ' and '.join(' | '.join(sorted(each or ())) for each in names)
         message = f'values of these types are never equal: {shown}'

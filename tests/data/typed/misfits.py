@@ -39,7 +39,7 @@ def follow(node, path):
         node.logger.info(f'{each}{frames}{last}{best.cost}{x}{y}{first}')
     node.state.path = [each.pose.position for each in path.poses]
     for point in node.state.path:
-        node.logger.info(point.label)
+        node.logger.info(point.label)  # error
 
 
 def steer(node, joy):
