@@ -12,9 +12,8 @@ from composer.interfaces.catalogue import InterfaceCatalogue
 from composer.language.pipeline import load_system
 from composer.python_source.modules import read_module
 from composer.stubs.checking import type_checker
-from composer.stubs.checking.annotated_copies import AnnotatedCopy
+from composer.stubs.checking.annotated_copies import AnnotatedCopy, ReportedPlace
 from composer.stubs.checking.kept_types import TypesCheck
-from composer.stubs.checking.left_alone import ReportedPlace
 from composer.stubs.checking.type_checker import TypeReport
 from composer.stubs.project_modules import ProjectModule
 

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from composer.node_uses.names import Value
     from composer.python_source.module_finder import ModuleFinder
     from composer.python_source.syntax import FunctionNode
-    from composer.stubs.checking.annotated_copies import FunctionUse
-    from composer.stubs.checking.left_alone import ReportedPlace
+    from composer.stubs.checking.annotated_copies import FunctionUse, ReportedPlace
 
 INTERFACE = re.compile(r'\.(msg|srv|action)\.')
 # Functions and modules whose types are those of Python itself.

@@ -27,7 +27,7 @@ from composer.python_source.syntax import (
 )
 from composer.records import record
 from composer.spelling import did_you_mean, find_nearest, is_typo, suggest
-from composer.stubs.checking.left_alone import ReportedPlace
+from composer.stubs.checking.annotated_copies import ReportedPlace
 from composer.stubs.checking.origins import INTERFACE, OF_PYTHON, Origins
 from composer.stubs.message_stubs import PARTS_OF_KINDS
 from composer.stubs.node_stubs import SENDING
