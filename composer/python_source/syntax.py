@@ -129,6 +129,16 @@ def home_of(statement: ast.ImportFrom, module: str, *, is_package: bool) -> str:
     return '.'.join([*package, *filter(None, [statement.module])]) if package else ''
 
 
+def imported_modules(
+    statement: ast.Import | ast.ImportFrom, module: str, *, is_package: bool
+) -> list[str]:
+    """Return the full names of what may be modules in an import."""
+    if isinstance(statement, ast.Import):
+        return [alias.name for alias in statement.names]
+    home = home_of(statement, module, is_package=is_package)
+    return [home, *(f'{home}.{alias.name}' for alias in statement.names)]
+
+
 def list_arguments(arguments: ast.arguments) -> list[ast.arg]:
     """Return all parameters, `*args` and `**kwargs` included."""
     named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]

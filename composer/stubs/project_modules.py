@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from composer.language.bindings import node_bindings
 from composer.python_source.module_finder import MissingModule, project_search_path
-from composer.python_source.syntax import home_of
+from composer.python_source.syntax import imported_modules
 from composer.records import record
 
 if TYPE_CHECKING:
@@ -83,10 +83,6 @@ def _read(context: CheckContext, name: str, roots: list[Path]) -> ProjectModule 
     tree = ast.Module([*source.body], [])
     imports: list[str] = []
     for node in source.import_statements:
-        if isinstance(node, ast.Import):
-            imports += [alias.name for alias in node.names]
-        else:
-            home = home_of(node, name, is_package=source.is_package)
-            imports += [home, *(f'{home}.{alias.name}' for alias in node.names)]
+        imports += imported_modules(node, name, is_package=source.is_package)
     module = ProjectModule(name, source, tree, tuple(dict.fromkeys(imports)))
     return module if any(root / module.path == source.path for root in roots) else None

@@ -20,11 +20,11 @@ from composer.diagnostics import diagnostic_at
 from composer.interfaces.message_types import PARTS, in_python
 from composer.node_uses.reading import Problem
 from composer.python_source.annotations import dotted_name, find_interface
-from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
 from composer.python_source.syntax import (
     bound_names,
     home_of,
+    imported_modules,
     imported_names,
     list_nodes,
     words_in,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from composer.checks.context import CheckContext
     from composer.diagnostics import Diagnostic, Span
     from composer.interfaces.catalogue import InterfaceKind
-    from composer.language.bindings import Binding
+    from composer.language.specs import BehaviourSpec
 
 _KINDS: tuple[InterfaceKind, ...] = ('msg', 'srv', 'action')
 # What a test mentions that asks what there is.
@@ -64,169 +64,149 @@ _PLAIN = (ast.Import, ast.ImportFrom, ast.Expr, ast.Assign, ast.AnnAssign)
 
 def check_missing_modules(context: CheckContext) -> Iterator[Diagnostic]:
     """Check the imports of the modules of behaviours, and of what these import of the project."""
-    walk = _Walk(context)
-    for binding in context.all_bindings():
-        if not context.was_dropped(binding.behaviour.path):
-            walk.visit(binding.behaviour.module, binding)
-            walk.visit_function(binding)
-    modules = [each.source for each in walk.importers]
-    if not any(_CHANGES_THE_SEARCH.search('\n'.join(module.lines)) for module in modules):
-        yield from walk.findings
-        library = _Library(context)
-        for importer in walk.importers:
-            for missing in library.find_missing(importer.source):
-                where = f"'{importer.binding.behaviour.name}' is in this module, or imports it"
-                related = [context.related_value(importer.binding.behaviour.path, where)]
-                place, rule, advice = missing.place, missing.rule, missing.help
-                yield diagnostic_at(place, rule, missing.message, help=advice, related=related)
+    importers = _find_importers(context)
+    if any(_CHANGES_THE_SEARCH.search('\n'.join(each.source.lines)) for each in importers):
+        return
+    imports, library = _Imports(context), _Library(context)
+    for importer in importers:
+        behaviour = importer.behaviour
+        where = f"'{behaviour.name}' is in this module, or imports it"
+        related = [context.related_value(behaviour.path, where)]
+        for each in (*imports.check(importer), *library.find_missing(importer.source)):
+            yield diagnostic_at(
+                each.place, each.rule, each.message, help=each.help, related=related
+            )
 
 
 @record
 class _Importer:
-    """A module with an import, and the first behaviour that needs it."""
+    """A module of the project, its imports on no condition, and the first behaviour with it."""
 
     name: str
     source: ModuleSource
-    binding: Binding
+    imports: list[_Import]
+    behaviour: BehaviourSpec
 
 
-@dataclass(slots=True)
-class _Walk:
-    """Follows the imports of a project, each module once."""
+def _find_importers(context: CheckContext) -> list[_Importer]:
+    """Follow the imports of the modules of behaviours, each once."""
+    behaviours: dict[str, dict[str, BehaviourSpec]] = {}
+    for binding in context.all_bindings():
+        behaviour = binding.behaviour
+        if not context.was_dropped(behaviour.path):
+            behaviours.setdefault(behaviour.module, {}).setdefault(behaviour.function, behaviour)
+    found: dict[str, _Importer] = {}
+    pending = [(name, next(iter(of.values()))) for name, of in reversed(behaviours.items())]
+    while pending and len(found) < _MOST_MODULES:
+        name, behaviour = pending.pop()
+        if not name or name in found or not _is_of_project(context, name):
+            continue
+        pending.append((name.rpartition('.')[0], behaviour))
+        source = context.modules.find(name)
+        if isinstance(source, ModuleSource) and source.path is not None:
+            imports = _certain_imports(source, behaviours.get(name, ()))
+            found[name] = _Importer(name, source, imports, behaviour)
+            for each in imports:
+                modules = imported_modules(each, name, is_package=source.is_package)
+                pending += [(module, behaviour) for module in modules]
+    return [*found.values()]
+
+
+def _certain_imports(module: ModuleSource, functions: Iterable[str]) -> list[_Import]:
+    """Return the imports at the top of a module, and those with which functions begin."""
+    statements = [*module.body]
+    for name in functions:
+        function = module.find_function(name)
+        body = function.definition.body if function and function.definition else ()
+        statements += takewhile(lambda each: isinstance(each, _PLAIN), body)
+    return [each for each in statements if isinstance(each, _Import)]
+
+
+def _is_of_project(context: CheckContext, name: str) -> bool:
+    # Where Composer is developed, it is one itself.
+    return name.partition('.')[0] != 'composer' and context.modules.is_of_project(name)
+
+
+@record
+class _Imports:
+    """What there is to import."""
 
     context: CheckContext
-    findings: list[Diagnostic] = field(default_factory=list)
-    importers: list[_Importer] = field(default_factory=list)
-    _visited: set[str] = field(default_factory=set)
 
-    def visit(self, name: str, binding: Binding) -> None:
-        """Check the imports of a module of the project, and of the packages that it is in."""
-        pending = [name]
-        while pending:
-            each = pending.pop()
-            if each in self._visited:
+    def check(self, importer: _Importer) -> Iterator[Problem]:
+        """Check the imports of a module."""
+        source = importer.source
+        for statement in importer.imports:
+            if isinstance(statement, ast.Import):
+                for alias in statement.names:
+                    yield from self._check_module(alias.name, source.span_of(alias, alias.name))
                 continue
-            self._visited.add(each)
-            if len(self.importers) >= _MOST_MODULES or not self._is_of_project(each):
-                continue
-            pending += [each.rpartition('.')[0]] if '.' in each else []
-            module = self.context.modules.find(each)
-            if isinstance(module, ModuleSource) and module.path is not None:
-                importer = _Importer(each, module, binding)
-                self.importers.append(importer)
-                for statement in module.body:
-                    if isinstance(statement, _Import):
-                        pending += self._check(statement, importer)
+            dots = '.' * statement.level
+            written = dots + (statement.module or '')
+            place = source.place_of(statement.lineno).narrowed_to(written, first=True)
+            home = home_of(statement, importer.name, is_package=source.is_package)
+            if home:
+                yield from self._check_module(home, place)
+                yield from self._check_members(home, statement.names, source)
+            else:
+                message = f"'{importer.name}' is in no package that '{dots}' means"
+                yield Problem(_RULE, message, place, 'import it by its full name')
 
-    def visit_function(self, binding: Binding) -> None:
-        """Check the imports with which a behaviour begins."""
-        behaviour = binding.behaviour
-        module = self.context.modules.find(behaviour.module)
-        if isinstance(module, MissingModule) or behaviour.name in self._visited:
-            return
-        self._visited.add(behaviour.name)
-        function = module.find_function(behaviour.function)
-        body = function.definition.body if function and function.definition else ()
-        for statement in takewhile(lambda each: isinstance(each, _PLAIN), body):
-            if isinstance(statement, _Import):
-                importer = _Importer(behaviour.module, module, binding)
-                for name in self._check(statement, importer):
-                    self.visit(name, binding)
-
-    def _check(self, statement: _Import, importer: _Importer) -> list[str]:
-        """Check an import; return the modules that it imports."""
-        if isinstance(statement, ast.Import):
-            for alias in statement.names:
-                place = importer.source.span_of(alias, alias.name)
-                self._check_module(alias.name, importer, place)
-            return [alias.name for alias in statement.names]
-        written = '.' * statement.level + (statement.module or '')
-        place = importer.source.place_of(statement.lineno).narrowed_to(written, first=True)
-        home = home_of(statement, importer.name, is_package=importer.source.is_package)
-        if not home:
-            message = f"'{importer.name}' is in no package that '{'.' * statement.level}' means"
-            self._report(message, 'import it by its full name', importer, place)
-            return []
-        if not self._check_module(home, importer, place):
-            return []
-        aliases = [each for each in statement.names if each.name != '*']
-        for alias in aliases:
-            if self._is_of_project(home) and not self._is_of_interfaces(home):
-                self._check_member(home, alias, importer)
-        return [home, *(f'{home}.{alias.name}' for alias in aliases)]
-
-    def _check_module(self, name: str, importer: _Importer, place: Span) -> bool:
-        """Check that a module exists; return whether it does."""
-        modules = self.context.modules
+    def _check_module(self, name: str, place: Span) -> Iterator[Problem]:
+        """Check that a module exists."""
+        missing = self.context.modules.find_missing(name)
         # Those of the project may be gone since a running system has loaded them.
-        is_loaded = name in sys.modules and not self._is_of_project(name)
-        if is_loaded or name in sys.stdlib_module_names:
-            return True
-        if modules.has(name):
-            return True
+        is_loaded = name in sys.modules and not _is_of_project(self.context, name)
+        if missing is None or is_loaded or name in sys.stdlib_module_names:
+            return
+        wrong, advice = '', None
         if self._is_of_interfaces(name):
             # What is declared may be built only later.
-            kind = name.split('.')[1] if '.' in name else ''
-            if kind and kind not in _KINDS:
-                help_text = did_you_mean(find_nearest(kind, _KINDS))
-                self._report(f"there is no module '{name}'", help_text, importer, place)
-            return True
-        missing = modules.find_missing(name)
-        if missing is not None and self._is_certain(missing.missing):
+            kind = name.partition('.')[2].partition('.')[0]
+            if kind not in ('', *_KINDS):
+                wrong, advice = name, did_you_mean(find_nearest(kind, _KINDS))
+        elif self._is_certain(missing.missing):
             otherwise = 'correct its name, or install the package that has it'
-            help_text = did_you_mean(missing.nearest, otherwise)
-            self._report(f"there is no module '{missing.missing}'", help_text, importer, place)
-        return False
+            wrong, advice = missing.missing, did_you_mean(missing.nearest, otherwise)
+        if wrong:
+            yield Problem(_RULE, f"there is no module '{wrong}'", place, advice)
 
     def _is_certain(self, missing: str) -> bool:
         """Return whether a module is missing wherever the system can run."""
         top, _, inner = missing.partition('.')
-        modules = self.context.modules
-        if inner and self._is_of_project(top):
+        if not inner:
+            # A Python without ROS cannot run the system: another one has what it needs.
+            return bool(importlib.util.find_spec('rclpy'))
+        if _is_of_project(self.context, top):
             return True
-        if inner:
-            # Packages that are installed may make their modules themselves.
-            is_of_python = top in sys.stdlib_module_names
-            return is_of_python and modules.is_package(missing.rpartition('.')[0])
-        # A Python without ROS cannot run the system: another one has what it needs.
-        return bool(importlib.util.find_spec('rclpy'))
-
-    def _is_of_project(self, name: str) -> bool:
-        # Where Composer is developed, it is one itself.
-        is_composer = name.partition('.')[0] == 'composer'
-        return not is_composer and self.context.modules.is_of_project(name)
+        # Packages that are installed may make their modules themselves.
+        is_of_python = top in sys.stdlib_module_names
+        return is_of_python and self.context.modules.is_package(missing.rpartition('.')[0])
 
     def _is_of_interfaces(self, name: str) -> bool:
         top = name.partition('.')[0]
         return top in self.context.spec.interfaces or top in self.context.catalogue.packages()
 
-    def _check_member(self, home: str, alias: ast.alias, importer: _Importer) -> None:
-        """Check a name that is imported from a module or package of the project."""
-        source, name = self.context.modules.find(home), f'{home}.{alias.name}'
-        if not isinstance(source, ModuleSource) or self.context.modules.has(name):
+    def _check_members(
+        self, home: str, names: list[ast.alias], importer: ModuleSource
+    ) -> Iterator[Problem]:
+        """Check names that are imported from a module or package of the project."""
+        source, modules = self.context.modules.find(home), self.context.modules
+        is_own = _is_of_project(self.context, home) and not self._is_of_interfaces(home)
+        if not isinstance(source, ModuleSource) or not is_own or source.syntax_error:
             return
-        place, top = importer.source.span_of(alias, alias.name), source.top
-        bound = {*top.statements, *top.stored_again}
-        if source.path is None:
-            missing = self.context.modules.find_missing(name)
-            help_text = did_you_mean(missing.nearest if missing else None)
-            self._report(f"there is no module '{name}'", help_text, importer, place)
-        elif not (
-            source.syntax_error
-            or (source.is_open or top.is_dynamic)
-            or (alias.name in bound or alias.name.startswith('__'))
-        ):
-            known = {*source.functions, *source.constants} or bound
-            help_text = suggest(alias.name, known, 'it has')
-            self._report(f"{home} has no '{alias.name}'", help_text, importer, place)
-
-    def _report(
-        self, message: str, help_text: str | None, importer: _Importer, place: Span
-    ) -> None:
-        behaviour = importer.binding.behaviour
-        where = f"'{behaviour.name}' cannot be imported without it"
-        related = [self.context.related_value(behaviour.path, where)]
-        self.findings.append(diagnostic_at(place, _RULE, message, help=help_text, related=related))
+        bound = {*source.top.statements, *source.top.stored_again}
+        known = {*source.functions, *source.constants} or bound
+        is_open = source.is_open or source.top.is_dynamic
+        for alias in names:
+            name, place = alias.name, importer.span_of(alias, alias.name)
+            if name == '*' or name.startswith('__'):
+                continue
+            if source.path is None:
+                yield from self._check_module(f'{home}.{name}', place)
+            elif not (is_open or name in bound or modules.has(f'{home}.{name}')):
+                advice = suggest(name, known, 'it has')
+                yield Problem(_RULE, f"{home} has no '{name}'", place, advice)
 
 
 @dataclass(slots=True)
@@ -239,24 +219,24 @@ class _Library:
     def find_missing(self, module: ModuleSource) -> Iterator[Problem]:
         """Yield the names that the code of a module uses, and that do not exist."""
         nodes = list_nodes(module.body)
-        imports = _imports_of(nodes)
+        imports, asked = _imports_of(nodes), set(map(id, _asked_first(nodes)))
         attributes = [node for node in nodes if isinstance(node, ast.Attribute)]
         stored = {node.attr for node in attributes if isinstance(node.ctx, ast.Store)}
-        asked = set(map(id, _asked_first(nodes)))
-        for node in (each for each in nodes if id(each) not in asked):
-            names: list[tuple[str, str, ast.AST]] = []
-            rule = 'unknown-attribute'
+        used: list[tuple[str, str, ast.AST]] = []
+        for node in nodes:
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                rule = _RULE
-                names = [(node.module, alias.name, alias) for alias in node.names]
+                used += [(node.module, alias.name, alias) for alias in node.names]
             elif isinstance(node, ast.Attribute) and node.attr not in stored:
                 first, dot, rest = dotted_name(node.value).partition('.')
-                if first in imports:
-                    names = [(imports[first] + dot + rest, node.attr, node)]
-            for owner, name, place in names:
-                if problem := self._explain(owner, name, rule):
-                    rule, message, advice = problem
-                    yield Problem(rule, message, module.span_of(place, name), advice)
+                used += (
+                    [(imports[first] + dot + rest, node.attr, node)] if first in imports else []
+                )
+        for owner, name, place in used:
+            rule = _RULE if isinstance(place, ast.alias) else 'unknown-attribute'
+            problem = None if id(place) in asked else self._explain(owner, name, rule)
+            if problem:
+                rule, message, advice = problem
+                yield Problem(rule, message, module.span_of(place, name), advice)
 
     def _explain(self, owner: str, name: str, rule: str) -> tuple[str, str, str | None] | None:
         """Return the rule that a name breaks for certain, if it does, and what is wrong."""
