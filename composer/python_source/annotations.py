@@ -19,11 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
 _BUILTINS = {'bool', 'bytes', 'dict', 'float', 'int', 'list', 'set', 'str', 'tuple'}
-_GENERATORS = {'AsyncGenerator', 'AsyncIterable', 'AsyncIterator'} | {
-    'Generator',
-    'Iterable',
-    'Iterator',
-}
 # The classes are in modules with a leading underscore, such as `std_msgs.msg._string`.
 _INTERFACE = re.compile(
     r'(\w+)\.(msg|srv|action)\.(?:_\w+\.)*([A-Z]\w*)'
@@ -31,44 +26,24 @@ _INTERFACE = re.compile(
 )
 
 
-@record
-class Annotation:
-    """What is known of an annotation; nothing if it can mean anything.
-
-    Attributes:
-        interface: The full name of an interface type, as in `std_msgs/msg/String` or
-            `std_srvs/srv/SetBool_Request`.
-        builtin: The name of a built-in type, as in `str`.
-        items: The arguments of a generator type, as in `Generator[yielded, sent, returned]`.
-    """
-
-    interface: str | None = None
-    builtin: str | None = None
-    items: tuple[ast.expr, ...] = ()
-
-
-def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> Annotation:
-    """Return what is known of an annotation in a module.
+def read_annotation(expression: ast.expr | None, imports: Mapping[str, str]) -> str:
+    """Return the interface or the built-in type of an annotation; empty if it can mean anything.
 
     Args:
         imports: The full dotted names of what the module imports, by name.
     """
     if isinstance(expression, ast.Constant) and isinstance(expression.value, str):
         try:
-            expression = ast.parse(expression.value, mode='eval').body
+            expression = _parse(expression.value)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            return Annotation()
+            return ''
     if isinstance(expression, ast.Subscript):
-        name, items = dotted_name(expression.value), expression.slice
-        if name.rpartition('.')[2] in _GENERATORS:
-            return Annotation(items=tuple(items.elts if isinstance(items, ast.Tuple) else [items]))
-        return Annotation(builtin=name if name in _BUILTINS else None)
-    name = dotted_name(expression)
-    if name in _BUILTINS and name not in imports:
-        return Annotation(builtin=name)
-    first, separator, rest = name.partition('.')
+        expression = expression.value
+    first, separator, rest = dotted_name(expression).partition('.')
     full = imports.get(first)
-    return Annotation(interface=find_interface(full + separator + rest)) if full else Annotation()
+    if full is None:
+        return first if first in _BUILTINS and not rest else ''
+    return find_interface(full + separator + rest) or ''
 
 
 def dotted_name(expression: ast.expr | None) -> str:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from composer.diagnostics import Related, diagnostic_at
 from composer.interfaces.message_types import in_python
-from composer.interfaces.payload_checks import check_payload
 from composer.language.includes.include_entry import shown_path
 from composer.node_uses.node_calls import advise_first
-from composer.python_source.annotations import Annotation, find_wanted_values, read_annotation
+from composer.python_source.annotations import find_wanted_values, read_annotation
 from composer.python_source.function_kinds import FunctionKind
 from composer.python_source.module_finder import MissingModule
 from composer.python_source.modules import ModuleSource
@@ -27,14 +26,9 @@ if TYPE_CHECKING:
     from composer.language.bindings import Binding
     from composer.language.specs import BehaviourSpec
     from composer.node_uses.reading import Wire
-    from composer.python_source.syntax import FunctionNode
 
 # Modules of the standard library with functions that take anything, such as `print`.
 _TAKE_ANYTHING = ('builtins', 'functools', 'logging', 'operator', 'pprint', 'unittest')
-# A value of each built-in type, to check against the field.
-_SAMPLES: dict[str, object] = {'bool': False, 'float': 0.5, 'int': 1, 'str': 'a'}
-# The index of the returned type in `Generator[yielded, sent, returned]`.
-_RETURNED = 2
 
 
 def check_behaviour_sources(context: CheckContext) -> Iterator[Diagnostic]:
@@ -305,57 +299,23 @@ def _find_problems(context: CheckContext, behaviour: BehaviourSpec, wire: Wire) 
     source = isinstance(module, ModuleSource) and module.find_function(behaviour.function)
     if not isinstance(module, ModuleSource) or not source or source.definition is None:
         return
-    yield from _check_parameters(context, wire, module, source.definition)
-    answer = read_annotation(source.definition.returns, module.imports)
-    if source.kind in (FunctionKind.PLAIN, FunctionKind.COROUTINE):
-        yield from _check_payload(context, 'returns', answer, wire.returned)
-        return
-    items = [read_annotation(each, module.imports) for each in answer.items]
-    if items:
-        yield from _check_payload(context, 'yields', items[0], wire.yielded)
-    if items and source.kind is FunctionKind.GENERATOR and len(items) > _RETURNED:
-        yield from _check_payload(context, 'returns', items[_RETURNED], wire.returned)
-
-
-def _check_parameters(
-    context: CheckContext, wire: Wire, module: ModuleSource, function: FunctionNode
-) -> Iterator[str]:
+    function = source.definition
     arguments = [*function.args.posonlyargs, *function.args.args]
-    if arguments:
-        first = read_annotation(arguments[0].annotation, module.imports)
-        if first.interface or first.builtin:
-            yield f"takes a {_noun(first)} as '{arguments[0].arg}', and is given the node first"
-    if wire.given is None or len(arguments) <= 1:
-        return
-    read = read_annotation(arguments[1].annotation, module.imports)
-    if read.builtin is None and (
-        read.interface is None or context.types.are_alike(read.interface, wire.given)
-    ):
-        return
-    given = in_python(wire.given)
-    yield f"takes a {_noun(read)} as '{arguments[1].arg}', and is given a {given}"
+    for argument, given in zip(arguments, ('', wire.given), strict=False):
+        read = read_annotation(argument.annotation, module.imports)
+        if read and given is not None and not context.types.are_alike(read, given):
+            shown = f'a {in_python(given)}' if given else 'the node first'
+            yield f"takes a {in_python(read)} as '{argument.arg}', and is given {shown}"
+    returned = read_annotation(function.returns, module.imports)
+    is_plain = source.kind in (FunctionKind.PLAIN, FunctionKind.COROUTINE)
+    if is_plain and wire.returned and '/' in returned:
+        yield from _check_payload(context, returned, wire.returned)
 
 
-def _check_payload(
-    context: CheckContext, verb: str, read: Annotation, wanted: str | None
-) -> Iterator[str]:
-    """Check a payload: a message, a mapping, or the bare value of a single field."""
-    if wanted is None:
-        return
+def _check_payload(context: CheckContext, returned: str, wanted: str) -> Iterator[str]:
+    """Check that a message is the wanted one, or its only field."""
     description = context.types.describe(wanted)
-    if read.interface is not None:
-        fields = description.fields if description is not None else ()
-        # The only field of a message may have this type.
-        fits = description is None or context.types.are_alike(read.interface, wanted)
-        fits |= len(fields) == 1 and fields[0].type.nested == read.interface
-    elif read.builtin in _SAMPLES and description is not None:
-        sample = _SAMPLES[read.builtin]
-        fits = not any(check_payload(description, sample, context.catalogue))
-    else:
-        return
-    if not fits:
-        yield f'{verb} a {_noun(read)}, which does not make a {in_python(wanted)}'
-
-
-def _noun(read: Annotation) -> str:
-    return read.builtin or in_python(read.interface or '')
+    fields = description.fields if description is not None else ()
+    is_field = len(fields) == 1 and fields[0].type.nested == returned
+    if description is not None and not is_field and not context.types.are_alike(returned, wanted):
+        yield f'returns a {in_python(returned)}, which does not make a {in_python(wanted)}'
