@@ -159,7 +159,7 @@ class Scope:
 # The classes whose objects threads wait for.
 _MADE = frozenset(
     {
-        *(f'threading.{each}' for each in ('Condition', 'Event', 'Thread')),
+        *(f'threading.{each}' for each in ('Condition', 'Event', 'Lock', 'Thread')),
         *(f'queue.{each}' for each in ('LifoQueue', 'PriorityQueue', 'Queue', 'SimpleQueue')),
     }
 )

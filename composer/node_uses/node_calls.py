@@ -124,7 +124,10 @@ def note_call(
     if method in SENDING_METHODS:
         _note_sent(run, method, arguments, scope, is_awaited=is_awaited)
     elif method in CREATING_METHODS:
-        yield from _note_created(run, method, arguments, scope)
+        if _are_swapped(run, arguments, scope):
+            run.escape(Chain(('node', method)))
+        else:
+            yield from _note_created(run, method, arguments, scope)
     elif method in ('get_parameters', 'set_parameters'):
         run.reading.reads_others |= method == 'get_parameters'
         _note_remote(run, arguments, scope)
@@ -142,10 +145,10 @@ def _note_sent(
     kind = SENDING_METHODS[method]
     named = run.names.value_of(arguments['name'], scope)
     is_wait = method in ('call', 'send_goal') or (method == 'call_async' and is_awaited)
-    waits: Waited = 'answer' if is_wait and scope.waits and not run.is_doubted else ''
+    waits: Waited = 'answer' if is_wait and scope.waits and not run.doubts else ''
     run.use(kind, named, waits=waits)
     payload, name = arguments.get('payload'), only_text(named)
-    is_known = name is not None and not (run.is_guarded or run.is_fixed)
+    is_known = name is not None and not (run.guards or run.fixed)
     if payload is not None and name and is_known and (method == 'publish' or not is_none(payload)):
         section, part = KIND_OF_NOUN[kind].section, _PARTS[method]
         sent = Payload(section, name, part, payload, scope.module, run.is_certain)
@@ -180,6 +183,18 @@ def _note_created(
         yield function, given if fits else []
     elif behaviour is not None:
         run.escape(Chain(('node',)))
+
+
+def _are_swapped(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> bool:
+    """Report a function or type that stands where the other argument belongs."""
+    for node in (arguments.get(name) for name in ('period', 'topic', 'srv_name')):
+        value = run.names.value_of(node, scope) if node is not None else None
+        is_type = isinstance(value, External) and find_interface(value.name) is not None
+        if node is not None and (is_type or isinstance(value, Function)):
+            text = f'this is a {"type" if is_type else "function"}, and belongs elsewhere'
+            run.report('bad-call', scope.module, node, text, 'swap the arguments')
+            return True
+    return False
 
 
 def _check_call(run: Run, noun: str, behaviour: ast.expr, scope: Scope) -> bool:
@@ -242,7 +257,7 @@ def _note_remote(run: Run, arguments: Mapping[str, ast.expr], scope: Scope) -> N
     """Note parameters of another node, if the code names both."""
     target = run.names.value_of(arguments['node_name'], scope)
     given = arguments.get('values') or arguments.get('names')
-    if target == Chain(('node', 'name')) and run.is_certain and not run.is_guarded:
+    if target == Chain(('node', 'name')) and run.is_certain and not run.guards:
         target = Texts((('', arguments['node_name'], scope.module),))
     if not isinstance(target, Texts) or len(target.options) > 1:
         return

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from composer.diagnostics import Related, Span
     from composer.language.bindings import Binding
     from composer.language.specs import EndSpec, NodeSpec
-    from composer.node_uses.names import Chain, Names, Scope, Value
+    from composer.node_uses.names import Chain, Made, Names, Scope, Value
     from composer.python_source.modules import ModuleSource
 
 # What a behaviour waits for when it uses an entity.
@@ -335,66 +335,79 @@ class Run:
     """What all parts of a reading share.
 
     Attributes:
-        conditions: What decides on conditions before the place: `file`, `state`, or `fixed` if
-            they hang on a constant, a type or the node's name. With each, the name of the state
-            that has to hold, if that is all.
-        around: What the place is in: branches on which `file` or `fixed` decides, statements that
-            `guard` against wrong names, and `broad` ones that catch everything.
+        doubts: The number of conditions before the place on which the file decides.
+        branches: Those of them that it is on a branch of.
+        state_doubts: Likewise, on which what is kept in the state does.
+        held_states: The names of the state of which one of the latter is that they hold.
+        fixed: Those of the first that hang on a constant, a type or the node's name.
+        kinds: Those of these that it is on a branch of.
+        guards: The number of statements around it that catch what a wrong name raises, and of
+            those branches.
+        broad_guards: The number of statements around it that catch everything.
+        held_locks: The locks that are held, and the lines where they were taken.
         calls: Where the functions under way are called.
     """
 
     def __init__(self, names: Names) -> None:
         self.names = names
         self.reading = Reading()
-        self.conditions: frozenset[tuple[str, str]] = frozenset()
-        self.around: frozenset[str] = frozenset()
+        self.doubts = 0
+        self.branches = 0
+        self.state_doubts = 0
+        self.fixed = 0
+        self.kinds = 0
+        self.held_states: tuple[str, ...] = ()
+        self.guards = 0
+        self.broad_guards = 0
+        self.held_locks: list[tuple[Made, int]] = []
         self.calls: list[Span] = []
 
     @property
     def is_certain(self) -> bool:
         """Whether what is used at the place has to be there."""
-        return not (self.conditions or 'broad' in self.around)
+        return not (self.doubts or self.state_doubts or self.broad_guards)
 
     @property
-    def is_doubted(self) -> bool:
-        """Whether the file decides on whether the place is reached."""
-        return any(chosen != 'state' for chosen, _ in self.conditions)
+    def standing(self) -> tuple[int, int, int, tuple[str, ...]]:
+        """The conditions that a function may leave behind."""
+        return self.doubts, self.state_doubts, self.fixed, self.held_states
 
-    @property
-    def is_fixed(self) -> bool:
-        """Whether a constant, a type or the name of the node decides on that."""
-        return ('fixed', '') in self.conditions
-
-    @property
-    def is_guarded(self) -> bool:
-        """Whether a wrong name does no harm, or may be for another type or node."""
-        return not self.around.isdisjoint(('guard', 'fixed'))
-
-    @property
-    def is_caught(self) -> bool:
-        """Whether errors are caught at the place, or a wrong name does no harm."""
-        return self.is_guarded or 'broad' in self.around
+    @standing.setter
+    def standing(self, conditions: tuple[int, int, int, tuple[str, ...]]) -> None:
+        self.doubts, self.state_doubts, self.fixed, self.held_states = conditions
 
     @contextmanager
     def condition(self, chosen: str, held: str = '') -> Iterator[None]:
-        """Note what is read meanwhile as read on a condition of the file, or the state."""
-        before = self.conditions
+        """Note what is read meanwhile as read on a condition of the file, or the state.
+
+        What hangs on a constant, a type or the name of the node may be for another case.
+        """
+        before = self.standing
         self.doubt(chosen, held)
-        with self.within(chosen):
+        is_of_file = chosen in ('file', 'fixed')
+        self.branches += is_of_file
+        self.kinds += chosen == 'fixed'
+        with self.guard(is_guard=chosen == 'fixed'):
             yield
-        self.conditions = before
+        self.kinds -= chosen == 'fixed'
+        self.branches -= is_of_file
+        self.standing = before
 
     def doubt(self, chosen: str, held: str = '') -> None:
         """Note a condition from here on."""
-        self.conditions |= {(chosen, held)} if chosen else set()
+        self.held_states += (held,) if held else ()
+        self.doubts += chosen in ('file', 'fixed')
+        self.state_doubts += chosen == 'state'
+        self.fixed += chosen == 'fixed'
 
     @contextmanager
-    def within(self, *around: str) -> Iterator[None]:
-        """Note what is read meanwhile as within branches or statements."""
-        before = self.around
-        self.around |= {*around}
+    def guard(self, *, is_guard: bool, is_broad: bool = False) -> Iterator[None]:
+        """Note what is read meanwhile as guarded, if it is."""
+        self.guards += is_guard
+        self.broad_guards += is_broad
         yield
-        self.around = before
+        self.guards -= is_guard
+        self.broad_guards -= is_broad
 
     def report(
         self, rule: str, module: ModuleSource, node: ast.AST, message: str, help_text: str | None
@@ -403,7 +416,7 @@ class Run:
 
         It is one in any system, so where only the file decides whether the place is reached, too.
         """
-        if not self.is_caught:
+        if not (self.guards or self.broad_guards):
             problem = Problem(rule, message, module.span_of(node), help_text)
             self.reading.problems.append(problem)
 
@@ -430,7 +443,7 @@ class Run:
                 is_optional,
                 has_default,
                 self.is_certain and is_one,
-                self.is_guarded,
+                bool(self.guards),
                 waits if is_one else '',
                 is_change,
             )
@@ -444,7 +457,7 @@ class Run:
 
     def use_state(self, name: str, module: ModuleSource, node: ast.expr) -> None:
         """Note that a name of `node.state` is read."""
-        is_guarded = self.is_guarded or bool(self.conditions)
+        is_guarded = bool(self.guards or self.doubts or self.state_doubts)
         use = NodeUse('state', name, module.span_of(node, name), is_guarded=is_guarded)
         self.reading.state_read.append(use)
 

@@ -6,12 +6,12 @@ import ast
 from typing import TYPE_CHECKING
 
 from composer.node_uses.message_uses import shown_value
-from composer.node_uses.names import Chain
+from composer.node_uses.names import Chain, External, Made
 from composer.node_uses.reading import Awaited, Block
 from composer.python_source.syntax import is_none, own_nodes
 
 if TYPE_CHECKING:
-    from composer.node_uses.names import Made, Scope
+    from composer.node_uses.names import Scope
     from composer.node_uses.reading import Run
 
 QUEUES = ('queue.LifoQueue', 'queue.PriorityQueue', 'queue.Queue', 'queue.SimpleQueue')
@@ -26,16 +26,19 @@ FILLING: dict[str, frozenset[str]] = {
     'threading.Condition': frozenset({'notify', 'notify_all'}),
     **dict.fromkeys(QUEUES, frozenset({'put', 'put_nowait'})),
 }
-THREAD = 'threading.Thread'
+LOCK, THREAD = 'threading.Lock', 'threading.Thread'
 # Methods after which a wait is as before.
 _HARMLESS = frozenset({'clear', 'task_done', 'acquire', 'release'})
 _ASKING = frozenset({'empty', 'full', 'is_set', 'qsize'})
+_CLOCKS = frozenset({'time.monotonic', 'time.perf_counter', 'time.time'})
 _WAYS_OUT = (ast.Break, ast.Return, ast.Raise, ast.Yield, ast.YieldFrom, ast.Await)
 
 
 def note_method(run: Run, owner: Made, call: ast.Call, name: str, scope: Scope) -> None:
     """Note a call of a method of something that threads wait for."""
-    if owner.kind in WAITING:
+    if owner.kind == LOCK and name in ('acquire', 'release'):
+        run.held_locks = [each for each in run.held_locks if each[0] != owner]
+    elif owner.kind in WAITING:
         place = owner.module.span_of(owner.node)
         made_at = f'{place.source.name}:{place.line}:{place.column}'
         noun = f'this {owner.kind.rpartition(".")[2].lower()}'
@@ -60,7 +63,7 @@ def _note(run: Run, what: Awaited, call: ast.Call, name: str, scope: Scope) -> N
 
 
 def _block(run: Run, what: Awaited, scope: Scope, node: ast.expr) -> None:
-    if scope.waits and not (run.is_doubted or 'broad' in run.around):
+    if scope.waits and not (run.doubts or run.broad_guards):
         called_at = run.calls[0] if run.calls else None
         run.reading.blocks.append(Block(what, scope.module.span_of(node), called_at))
 
@@ -79,13 +82,25 @@ def _is_timed(name: str, call: ast.Call) -> bool:
     return not is_none(timeout)
 
 
+# Locks
+
+
+def take(run: Run, lock: Made, node: ast.expr, scope: Scope) -> None:
+    """Report that a lock is taken by who has it already."""
+    line = next((line for each, line in run.held_locks if each == lock), None)
+    if line is not None and scope.waits:
+        text = f'this waits for ever for a lock that the behaviour has taken in line {line}'
+        help_text = 'write threading.RLock, or take it in one place'
+        run.report('blocked-group', scope.module, node, text, help_text)
+
+
 # Time
 
 
 def note_sleep(run: Run, seconds: ast.expr, node: ast.expr, scope: Scope) -> None:
     """Note how long the behaviour sleeps."""
     number = shown_value(_meant(run, seconds, scope))
-    if isinstance(number, int | float) and scope.waits and not run.is_doubted:
+    if isinstance(number, int | float) and scope.waits and not run.doubts:
         run.reading.sleeps.append((float(number), scope.module.span_of(node)))
 
 
@@ -104,7 +119,7 @@ def _meant(run: Run, node: ast.expr, scope: Scope) -> ast.expr:
 
 
 def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
-    """Note a loop that only others end."""
+    """Note a loop that only others end, or only the clock."""
     outs = [each for each in own_nodes(loop) if isinstance(each, _WAYS_OUT)]
     test = loop.test
     if isinstance(test, ast.Constant):
@@ -115,9 +130,35 @@ def note_loop(run: Run, loop: ast.While, scope: Scope) -> None:
                 return
     elif outs:
         return
+    limit = _limit_of(run, test, scope)
+    if limit is not None:
+        note_sleep(run, limit, test, scope)
+        return
     match [*_names_in(run, test, scope)]:
         case [Awaited() as what]:
             _block(run, what, scope, test)
+
+
+def _limit_of(run: Run, test: ast.expr, scope: Scope) -> ast.expr | None:
+    """Return how long a loop goes on that only the clock ends."""
+    match test:
+        case ast.Compare(
+            left=ast.BinOp(left=clock, op=ast.Sub()),
+            ops=[ast.Lt() | ast.LtE()],
+            comparators=[limit],
+        ):
+            return limit if _is_clock(run, clock, scope) else None
+        case ast.Compare(left=clock, ops=[ast.Lt() | ast.LtE()], comparators=[ast.Name() as end]):
+            match _meant(run, end, scope):
+                case ast.BinOp(left=begin, op=ast.Add(), right=limit):
+                    is_clock = _is_clock(run, clock, scope) and _is_clock(run, begin, scope)
+                    return limit if is_clock else None
+    return None
+
+
+def _is_clock(run: Run, node: ast.expr, scope: Scope) -> bool:
+    function = run.names.value_of(node.func, scope) if isinstance(node, ast.Call) else None
+    return isinstance(function, External) and function.name in _CLOCKS
 
 
 def _names_in(run: Run, test: ast.expr, scope: Scope) -> set[Awaited | None]:

@@ -70,6 +70,12 @@ NODE_ATTRIBUTES = frozenset(
         'subscriptions',
     }
 )
+LOGGER_NAMES = frozenset(
+    {
+        *('debug', 'error', 'fatal', 'get_child', 'get_effective_level', 'info', 'log', 'name'),
+        *('is_enabled_for', 'set_level', 'warn', 'warning'),
+    }
+)
 _SPINNING = frozenset(
     f'rclpy.{name}' for name in ('spin', 'spin_once', 'spin_until_future_complete')
 )
@@ -169,8 +175,8 @@ class Walk:
         if function.bound is not None and arguments:
             given[arguments[0]] = function.bound
         key = (
-            *(id(definition), is_waited, frozenset(given.items()), run.is_certain, run.is_doubted),
-            run.is_guarded,
+            *(id(definition), is_waited, frozenset(given.items()), run.is_certain, run.doubts > 0),
+            *(run.guards > 0, tuple(lock for lock, _ in run.held_locks)),
         )
         if key in self._entered:
             return
@@ -185,19 +191,19 @@ class Walk:
         self._note_place(definition)
         scope = Scope(function.module, definition, given, function.scope, waits=is_waited)
         run.reading.modules |= {id(each): each for each in (function.module, *function.makers)}
-        before = run.conditions
+        before = run.standing
         self._under_way.append(scope)
         if isinstance(definition, ast.Lambda):
             self.visit(definition.body, scope)
         else:
             self._block(definition.body, scope)
         self._under_way.pop()
-        run.conditions = before
+        run.standing = before
 
     def _note_place(self, node: ast.AST) -> None:
-        around = self.run.around
-        is_caught = not around.isdisjoint(('guard', 'broad'))
-        here = (is_caught, not around.isdisjoint(('file', 'fixed')), self.run.is_doubted)
+        run = self.run
+        is_caught = run.guards > run.kinds or run.broad_guards > 0
+        here = (is_caught, run.branches > 0, run.doubts > 0)
         self.places[id(node)] = min(here, self.places.get(id(node), here))
 
     def _follow(
@@ -328,19 +334,23 @@ class Walk:
             self.run.doubt(chosen, held)
 
     def _try(self, node: ast.Try | ast.TryStar, scope: Scope) -> None:
-        guard = ['guard'] if any(map(_is_guard, node.handlers)) else []
-        broad = ['broad'] if any(map(_is_broad, node.handlers)) else []
-        with self.run.within(*guard, *broad):
+        is_guard = any(map(_is_guard, node.handlers))
+        with self.run.guard(is_guard=is_guard, is_broad=any(map(_is_broad, node.handlers))):
             self._block(node.body, scope)
         for handler in node.handlers:
-            with self.run.within(*guard):
+            with self.run.guard(is_guard=is_guard):
                 self._block(handler.body, scope)
         self._else(node.orelse, scope)
         self._block(node.finalbody, scope)
 
     def _with(self, node: ast.With | ast.AsyncWith, scope: Scope) -> None:
+        held = [*self.run.held_locks]
         is_guard = False
         for item in node.items:
+            value = self._names.value_of(item.context_expr, scope)
+            if isinstance(value, Made) and value.kind == waiting.LOCK:
+                waiting.take(self.run, value, item.context_expr, scope)
+                self.run.held_locks.append((value, item.context_expr.lineno))
             self.visit(item.context_expr, scope)
             if item.optional_vars is not None:
                 self.visit(item.optional_vars, scope)
@@ -350,8 +360,9 @@ class Walk:
                 # One of the project may catch what its body raises.
                 is_guard |= isinstance(called, Class) or bool(words_in(func) & _SUPPRESSING)
                 is_guard |= called is None and isinstance(func, ast.Name)
-        with self.run.within(*['guard'] * is_guard):
+        with self.run.guard(is_guard=is_guard):
             self._block(node.body, scope)
+        self.run.held_locks = held
 
     def _assign(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope) -> None:
         """Walk through an assignment; the node may have another name, or be kept in its object."""
@@ -538,15 +549,14 @@ class Walk:
         match self._names.value_of(node, scope):
             case Chain(path=('node', 'parameters' | 'state' as of, name)):
                 run, full = self.run, f'{of}.{name}'
-                is_ready = run.is_caught or run.is_doubted
+                is_ready = bool(run.guards or run.broad_guards or run.doubts)
                 is_set = of == 'state' and name in run.reading.state_set
                 # A caller may have asked before.
                 is_ready |= any(full in self._asked_in(each) for each in (scope, *self._under_way))
                 if name in _OF_MAPPING or is_ready or is_set:
                     return
-                if of == 'parameters' or ('state', '') not in run.conditions:
-                    held = tuple(state for _, state in run.conditions if state)
-                    needed = NeededValue(of, name, scope.module.span_of(node), held)
+                if of == 'parameters' or len(run.held_states) == run.state_doubts:
+                    needed = NeededValue(of, name, scope.module.span_of(node), run.held_states)
                     run.reading.values_needed.append(needed)
 
     def _need_operands(self, node: ast.AST, scope: Scope) -> None:
@@ -697,7 +707,7 @@ class Walk:
 
     def _read_own_state(self, key: ast.expr, scope: Scope) -> None:
         named = self._names.value_of(key, scope)
-        is_guarded = self.run.is_guarded or self.run.is_doubted
+        is_guarded = bool(self.run.guards or self.run.doubts)
         for text, node, module in named.options if isinstance(named, Texts) else ():
             use = NodeUse('own_state', text, module.span_of(node, text), is_guarded=is_guarded)
             self.run.reading.own_state_read.append(use)
@@ -730,7 +740,7 @@ class Walk:
                     help_text = suggest(value, GOAL_STATUSES, 'it is one of')
                     self.run.report('never-equal', scope.module, other, text, help_text)
             case Chain(path=('node', 'parameters', name)), ast.Constant(value=str() as value):
-                if not self.run.is_guarded:
+                if not self.run.guards:
                     place = scope.module.span_of(other, value)
                     self.run.reading.compared.append((name, value, place))
 
@@ -784,6 +794,8 @@ class Walk:
             case ('node', 'ros', *_):
                 run.reading.reaches_ros = True
                 run.reading.open_kinds.add('parameter')
+            case ('node', 'logger', name, *_) if name not in LOGGER_NAMES:
+                self._unknown("the node's logger", name, LOGGER_NAMES, _prefix(node, name), scope)
             case ('node', method, name) if method in node_calls.NODE_METHODS and not hasattr(
                 _prefix, name
             ):
@@ -794,15 +806,19 @@ class Walk:
                 text, help_text = f"own_state has no '{name}'", f'write [{name!r}]'
                 run.report('unknown-attribute', scope.module, node, text, help_text)
             case ('node', name, *_) if name not in node_calls.NODE_METHODS | NODE_ATTRIBUTES:
-                written = _prefix(node, name)
-                if written is not None and not name.startswith('__'):
-                    self._unknown_attribute(name, written, scope)
+                if not name.startswith('__'):
+                    known = node_calls.NODE_METHODS | NODE_ATTRIBUTES
+                    self._unknown('the node', name, known, _prefix(node, name), scope)
 
-    def _unknown_attribute(self, name: str, node: ast.expr, scope: Scope) -> None:
-        help_text = suggest(name, node_calls.NODE_METHODS | NODE_ATTRIBUTES, 'it has')
-        if name in node_calls.OF_RCLPY or name in _ros_members():
+    def _unknown(
+        self, owner: str, name: str, known: frozenset[str], node: ast.expr | None, scope: Scope
+    ) -> None:
+        if node is None:
+            return
+        help_text = suggest(name, known, 'it has')
+        if owner == 'the node' and (name in node_calls.OF_RCLPY or name in _ros_members()):
             help_text = node_calls.OF_RCLPY.get(name, f"did you mean 'ros.{name}'?")
-        text = f"the node has no attribute '{name}'"
+        text = f"{owner} has no attribute '{name}'"
         self.run.report('unknown-attribute', scope.module, node, text, help_text)
 
     def _refuse_parameter(self, node: ast.expr, scope: Scope, name: str = '') -> None:
@@ -818,14 +834,14 @@ class Walk:
         is_write = isinstance(getattr(node, 'ctx', None), ast.Store | ast.Del)
         of_type = chain.path[1] if chain.path[0] == 'made' else None
         path = chain.path[2 if of_type else 1 :]
-        is_guarded = run.is_caught or run.is_fixed
+        is_guarded = run.guards or run.broad_guards or run.fixed
         if path and (is_write or not is_guarded):
             value = self._stored.get(id(node))
             if value is not None:
                 self.need(value, scope)
             # The type of a message that the behaviour makes is the same in any system.
             # In a function that is called, an argument may tell which type it is.
-            certain = not run.is_doubted or (bool(of_type) and not run.calls)
+            certain = not run.doubts or (bool(of_type) and not run.calls)
             use = MessageUse(path, node, scope.module, is_write, certain, of_type, value)
             run.reading.message_uses.append(use)
         for inner in ast.walk(node):
@@ -893,7 +909,7 @@ class Walk:
                     self.run.reading.payloads.append(payload)
             case External(name=name) if (interface := find_interface(name)) is not None:
                 for each in call.keywords:
-                    if each.arg and not self.run.is_caught:
+                    if each.arg and not (self.run.guards or self.run.broad_guards):
                         path, value = (each.arg,), each.value
                         use = MessageUse(path, value, scope.module, True, True, interface, value)
                         self.run.reading.message_uses.append(use)
@@ -969,7 +985,7 @@ class Walk:
                 waiting.note_method_of_state(run, name, call, method, scope)
                 is_noted = False
             case ('goal', name, 'result' | 'result_async' as method):
-                if scope.waits and not run.is_doubted and (method == 'result' or is_awaited):
+                if scope.waits and not run.doubts and (method == 'result' or is_awaited):
                     run.use('action client', Texts(((name, call, scope.module),)), waits='end')
                 self._visit_calls(call.func, scope)
             case ('message', *path, method):

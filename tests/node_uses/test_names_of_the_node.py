@@ -5,7 +5,7 @@ import inspect
 import pytest
 
 from composer.node_uses.node_calls import NODE_METHODS, signature_of
-from composer.node_uses.walk import NODE_ATTRIBUTES
+from composer.node_uses.walk import LOGGER_NAMES, NODE_ATTRIBUTES
 from composer.runtime.nodes.behaviour_node import Node
 
 
@@ -20,6 +20,13 @@ def parameters(function):
 
 def test_the_node_has_these_names():
     assert public(Node) == NODE_METHODS | NODE_ATTRIBUTES
+
+
+@pytest.mark.ros
+def test_its_logger_has_these_names():
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+
+    assert public(RcutilsLogger) <= LOGGER_NAMES
 
 
 @pytest.mark.parametrize('name', sorted(NODE_METHODS))

@@ -139,6 +139,7 @@ WRONG = {
     "print(node.own_state['seen'])": 'unknown-state',
     'node.own_state.seen = 1': 'unknown-attribute',
     "node.pubish('command', {})": 'unknown-attribute',
+    "node.logger.wran('late')": 'unknown-attribute',
     "node.publish('command')": 'bad-call',
     'pass_on(node)': 'bad-call',
     # names, round by round

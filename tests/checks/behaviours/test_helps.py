@@ -107,6 +107,9 @@ class C:
         ("node.create_subscription(String, 'x', partial(self.take, name=1))", 'bad-call', []),
         ("node.create_service(Trigger, 'x', lambda request: {})", 'bad-call', ['add node first']),
         ("node.create_service(Trigger, 'x', self.take)", 'bad-call', []),
+        ('node.create_timer(self.tick, 1 / 2)', 'bad-call', ['swap the arguments']),
+        ("node.create_publisher(f'{node.name}', String)", 'bad-call', ['swap the arguments']),
+        ("node.create_service(Trigger, hear, 'x')", 'bad-call', ['swap the arguments']),
         ('node.create_publisher(String, node.name)', 'bad-call', []),
         (
             "node.call('crane')",
