@@ -214,7 +214,7 @@ def _find_problem(
             if field is None:
                 wrong = explain_unknown(types, found, name)
                 # What is kept under another name is found where that gets it.
-                is_here = use.node is use.value or getattr(written, 'attr', '') == name
+                is_here = isinstance(written, ast.keyword) or getattr(written, 'attr', '') == name
                 if wrong is None or not is_here:
                     return None
                 return Problem('unknown-field', wrong[0], use.module.span_of(written), wrong[1])

@@ -193,7 +193,7 @@ class MessageUse:
     """
 
     path: tuple[str, ...]
-    node: ast.expr
+    node: ast.expr | ast.keyword
     module: ModuleSource
     is_write: bool = False
     is_certain: bool = True

@@ -911,7 +911,7 @@ class Walk:
                 for each in call.keywords:
                     if each.arg and not (self.run.guards or self.run.broad_guards):
                         path, value = (each.arg,), each.value
-                        use = MessageUse(path, value, scope.module, True, True, interface, value)
+                        use = MessageUse(path, each, scope.module, True, True, interface, value)
                         self.run.reading.message_uses.append(use)
             case External(name='builtins.hasattr' | 'builtins.getattr' | 'builtins.setattr'):
                 if self._call_attribute(func.name, call, scope):

@@ -292,6 +292,12 @@ class ModuleSource:
         end: int = getattr(node, 'end_col_offset', None) or start + 1
         if isinstance(node, ast.Attribute):
             name = node.attr
+        elif isinstance(node, ast.keyword) and node.arg:
+            line, start, end = (
+                first_line,
+                node.col_offset,
+                node.col_offset + len(node.arg.encode()),
+            )
         elif isinstance(node, _BINDING):
             line, name = first_line, node.name
             start, end = 0, len(self.source.line(line).encode())
