@@ -200,11 +200,12 @@ def test_external_processes_are_listed_and_restarted(compose, composer, wait_for
 
 
 def test_several_systems_are_told_apart(compose, composer):
-    systems = []
     for name in ('first', 'second', 'third'):
         text = SYSTEM.replace('arm:', f'arm_{name}:').replace('stuck:', f'stuck_{name}:')
-        words = ['--no-control'] if name == 'third' else []
-        systems.append(compose.run(compose.write(text, CODE, name).name, *words))
+        compose.write(text, CODE, name)
+    # All read one module, so it is written before the first of them starts.
+    systems = [compose.run(name) for name in ('first.yaml', 'second.yaml')]
+    systems.append(compose.run('third.yaml', '--no-control'))
     for system in systems:
         system.wait_until_ready()
     code, _, errors = composer('reload')
